@@ -1,0 +1,133 @@
+//! Acceleration structures behind one trait, and the registry of their names.
+
+mod query;
+
+pub use query::{Closest, HitSink, TravRay};
+
+use crate::{geom::Triangles, simd::Simd};
+
+/// Why a structure could not be built.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum BuildError {
+    /// More primitives than the structure's indices can hold.
+    #[error("{structure}: {actual} triangles, at most {limit} fit")]
+    TooMany {
+        /// The structure's name.
+        structure: &'static str,
+        /// Largest number that fits.
+        limit: usize,
+        /// Number given.
+        actual: usize,
+    },
+    /// A triangle names a vertex that does not exist.
+    #[error("triangle {prim}: vertex {vertex} of {count}")]
+    IndexOutOfRange {
+        /// The triangle.
+        prim: usize,
+        /// The vertex it names.
+        vertex: u32,
+        /// How many there are.
+        count: usize,
+    },
+    /// A setting that the structure does not know or cannot use.
+    #[error("{structure}: setting `{key}`: {reason}")]
+    Setting {
+        /// The structure's name.
+        structure: &'static str,
+        /// The setting's name.
+        key: String,
+        /// What is wrong with it.
+        reason: String,
+    },
+}
+
+/// Outcome of a refit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Refit {
+    /// The structure bounds the new positions.
+    Done,
+    /// Topology changed, or the structure cannot refit; `out` is unspecified.
+    NeedsRebuild,
+}
+
+/// What [`Accel::validate`] found wrong, in words.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Violation(pub String);
+
+/// Size and quality of a built structure.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct AccelStats {
+    /// Number of nodes, leaves included.
+    pub nodes: usize,
+    /// Number of leaves.
+    pub leaves: usize,
+    /// Longest path from the root, in nodes.
+    pub depth: usize,
+    /// Bytes of nodes alone.
+    pub node_bytes: usize,
+    /// Bytes of everything the structure owns.
+    pub total_bytes: usize,
+    /// Surface-area cost: expected node visits and triangle tests of a ray that meets the root box.
+    pub sah_cost: f64,
+}
+
+/// Counts what a traversal does. The unit type counts nothing and costs nothing.
+pub trait Counter {
+    /// A node's box was tested.
+    #[inline(always)]
+    fn node(&mut self) {}
+    /// A primitive was tested.
+    #[inline(always)]
+    fn prim(&mut self) {}
+}
+
+impl Counter for () {}
+
+/// A structure over triangles that answers rays exactly.
+///
+/// Every kind returns what `list` returns, bit for bit: the least exact `t`, equal `t` to the lower key.
+pub trait Accel: Sized + Clone + Send + Sync + std::fmt::Debug + 'static {
+    /// Name on the command line, in benches and in reports.
+    const NAME: &'static str;
+    /// Build settings.
+    type Config: Default + Clone + std::fmt::Debug + Send + Sync;
+
+    /// Builds over `prims`, in the current rayon pool.
+    ///
+    /// # Errors
+    /// When an index is out of range or a limit of the structure is passed.
+    fn build(prims: &Triangles<'_>, config: &Self::Config) -> Result<Self, BuildError>;
+
+    /// Writes into `out` this structure refitted to `prims`' positions, reusing `out`'s memory. No allocation
+    /// when `out` came from an earlier refit or clone of the same structure. Runs in the current rayon pool.
+    fn refit_into(&self, out: &mut Self, prims: &Triangles<'_>) -> Refit;
+
+    /// Offers to `best` every triangle that may beat it.
+    fn closest<S: Simd, C: Counter, K: HitSink>(
+        &self,
+        prims: &Triangles<'_>,
+        ray: &TravRay,
+        best: &mut Closest,
+        sink: &K,
+        count: &mut C,
+    );
+
+    /// True when any triangle that `sink` accepts is hit within the ray's range.
+    fn occluded<S: Simd, C: Counter, K: HitSink>(
+        &self,
+        prims: &Triangles<'_>,
+        ray: &TravRay,
+        sink: &K,
+        count: &mut C,
+    ) -> bool;
+
+    /// Checks every invariant against `prims`.
+    ///
+    /// # Errors
+    /// The first violation found.
+    fn validate(&self, prims: &Triangles<'_>) -> Result<(), Violation>;
+
+    /// Size and quality; O(nodes).
+    fn stats(&self) -> AccelStats;
+}

@@ -1,0 +1,11 @@
+//! Plain geometric values: boxes, rays, hits, borrowed triangle views. No allocation.
+
+mod aabb;
+mod hit;
+mod ray;
+mod triangles;
+
+pub use aabb::Aabb;
+pub use hit::{Hit, InstanceId, PrimId};
+pub use ray::Ray;
+pub use triangles::Triangles;

@@ -1,0 +1,3 @@
+//! The `kinora` program.
+
+fn main() {}

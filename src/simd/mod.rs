@@ -1,0 +1,10 @@
+//! SIMD levels, the wide types of each, and the one dispatch into them. The only home of `unsafe`.
+//!
+//! Code above is generic over `S:` [`Simd`] and marked `#[inline(always)]`; [`dispatch`] enters it once a
+//! tile or batch through a function that carries the level's `#[target_feature]`, so that everything below
+//! is compiled for the level. Results never depend on the level: no kernel contracts `a * b + c` where a
+//! result is kept.
+
+mod level;
+
+pub use level::{Scalar, Simd, SimdLevel, Task, dispatch};
