@@ -31,12 +31,23 @@ pub struct RenderSettings {
     pub shading: Shading,
     /// Samples a pixel, at least 1.
     pub samples: u32,
+    /// Number of the first sample in a pixel's pattern, so that the mean of several renders continues the
+    /// pattern: those of samples 0..4 and 4..8 are together the 8 samples of one. 0 for a picture in one go;
+    /// sample 0 is the pixel centre when `samples` is 1 and this is 0.
+    pub first_sample: u32,
     /// Seed of the sample pattern.
     pub seed: u64,
     /// Frame number, so that noise differs from frame to frame.
     pub frame: u64,
     /// SIMD level; changes no byte.
     pub simd: SimdLevel,
+}
+
+impl Default for RenderSettings {
+    /// One sample of [`Shading::Direct`] at the best SIMD level.
+    fn default() -> Self {
+        Self { shading: Shading::Direct, samples: 1, first_sample: 0, seed: 0, frame: 0, simd: SimdLevel::best() }
+    }
 }
 
 /// Renders `world` seen by `camera` into `film` (whose size decides the picture's), in parallel over tiles in
