@@ -1,0 +1,89 @@
+//! Arguments as typed; [`Settings`](super::settings::Settings) checks the common ones.
+
+use clap::{ArgAction, Args, Parser, Subcommand};
+
+#[cfg(feature = "player")]
+use super::play::PlayArgs;
+use super::{
+    cast::CastArgs, completions::CompletionsArgs, info::InfoArgs, logs::Verbosity, man::ManArgs, pose::PoseArgs,
+    render::RenderArgs,
+};
+
+/// Plays, renders and queries animated glTF scenes by ray tracing on the CPU.
+#[derive(Debug, Parser)]
+#[command(name = "kinora", version, propagate_version = true, arg_required_else_help = true)]
+pub(crate) struct Cli {
+    #[command(flatten)]
+    pub(crate) common: CommonArgs,
+    #[command(subcommand)]
+    pub(crate) command: Command,
+}
+
+/// The commands.
+#[derive(Debug, Subcommand)]
+pub(crate) enum Command {
+    #[cfg(feature = "player")]
+    /// Play a scene in a window
+    Play(PlayArgs),
+    /// Render a frame sequence or a still to files
+    Render(RenderArgs),
+    /// Say what a file holds and what it needs
+    Info(InfoArgs),
+    /// Write the world-space vertices of every mesh part at one time
+    Pose(PoseArgs),
+    /// Answer rays from a file, timed
+    Cast(CastArgs),
+    /// Print a shell's completion script
+    Completions(CompletionsArgs),
+    /// Print a manual page (roff)
+    Man(ManArgs),
+}
+
+/// Options of every command.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Common options")]
+pub(crate) struct CommonArgs {
+    /// Worker threads [default: KINORA_THREADS, else what the scheduler granted, else all cores]
+    #[arg(long, global = true, value_name = "N")]
+    pub(crate) threads: Option<usize>,
+    /// Structure over triangles, with its settings: NAME[:key=value,...]
+    #[arg(long, global = true, value_name = "NAME", default_value = "bvh2")]
+    pub(crate) accel: String,
+    /// Structure over groups of triangles
+    #[arg(long, global = true, value_name = "NAME", default_value = "bvh2")]
+    pub(crate) top: String,
+    /// Precision of hits; `exact` is the only one there is
+    #[arg(long, global = true, value_name = "PRECISION", default_value = "exact", value_parser = precision)]
+    pub(crate) precision: Precision,
+    /// Instruction set of the kernels: auto, scalar, avx2 or avx512; changes no result
+    #[arg(long, global = true, value_name = "LEVEL", default_value = "auto")]
+    pub(crate) simd: String,
+    /// Print errors only
+    #[arg(short, long, global = true, conflicts_with = "verbose")]
+    quiet: bool,
+    /// Print more: -v what was chosen and why, -vv stages, -vvv everything
+    #[arg(short, long, global = true, action = ArgAction::Count)]
+    verbose: u8,
+}
+
+impl CommonArgs {
+    /// How much to print.
+    pub(crate) fn verbosity(&self) -> Verbosity {
+        if self.quiet { Verbosity::QUIET } else { Verbosity::new(self.verbose) }
+    }
+}
+
+/// How exact hits are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Precision {
+    /// Correctly rounded.
+    Exact,
+}
+
+fn precision(text: &str) -> Result<Precision, String> {
+    match text {
+        "exact" => Ok(Precision::Exact),
+        "fast" => Err("this version has exact kernels only; leave the option out or say `exact`".to_owned()),
+        _ => Err("expected `exact`".to_owned()),
+    }
+}

@@ -1,0 +1,45 @@
+//! Log lines on stderr.
+
+use std::io::IsTerminal;
+
+use tracing::level_filters::LevelFilter;
+
+/// How much is printed to stderr: -1 errors only, 0 warnings and progress, 1 and more the logs too.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct Verbosity(i8);
+
+impl Verbosity {
+    /// Errors only.
+    pub(crate) const QUIET: Self = Self(-1);
+
+    /// From the number of `-v`.
+    pub(crate) fn new(count: u8) -> Self {
+        Self(i8::try_from(count.min(3)).unwrap_or(3))
+    }
+
+    /// False under `-q`.
+    pub(crate) fn shows_progress(self) -> bool {
+        self > Self::QUIET
+    }
+
+    fn filter(self) -> LevelFilter {
+        match self.0 {
+            ..0 => LevelFilter::ERROR,
+            0 => LevelFilter::WARN,
+            1 => LevelFilter::INFO,
+            2 => LevelFilter::DEBUG,
+            3.. => LevelFilter::TRACE,
+        }
+    }
+}
+
+/// Sends the library's log lines to stderr.
+pub(crate) fn init(verbosity: Verbosity) {
+    tracing_subscriber::fmt()
+        .with_max_level(verbosity.filter())
+        .with_writer(std::io::stderr)
+        .with_ansi(std::io::stderr().is_terminal())
+        .without_time()
+        .with_target(false)
+        .init();
+}
