@@ -1,20 +1,243 @@
-use glam::Vec3;
+//! Pose to world-space vertices: the one geometry that is traced, touched, measured and printed.
+//!
+//! Each vertex is morphed, then skinned or placed, all in `f64`, and rounded once to `f32`; a coordinate beyond
+//! the range of `f32` becomes the largest finite one. Vertices are taken in blocks that stay in the first
+//! cache level; the loops are plain arithmetic on arrays, compiled for the machine's SIMD level, and give the
+//! same bits on each.
 
-use super::Pose;
-use crate::scene::{PartInstance, Scene};
+use glam::{DAffine3, Vec3};
+use rayon::prelude::*;
+
+use super::{Pose, pose::JointColumns};
+use crate::{
+    scene::{Influences, MeshPart, PartInstance, Scene},
+    simd::{Simd, SimdLevel, Task, dispatch},
+};
+
+/// Vertices worked on together.
+const BLOCK: usize = 64;
+
+/// Vertices a parallel task takes.
+pub const DEFORM_GRAIN: usize = 4096;
+
+/// What takes morphed mesh-space vertices to the world.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Placement<'a> {
+    /// One matrix for all.
+    Whole(DAffine3),
+    /// A blend of joint matrices each.
+    Skinned {
+        /// Joints and weights.
+        influences: &'a Influences,
+        /// Joint matrices.
+        palette: &'a [JointColumns],
+    },
+}
+
+/// How an instance is placed: by its skin if node and part have one, else by its node and copy.
+pub(super) fn placement<'a>(scene: &'a Scene, pose: &'a Pose, instance: PartInstance) -> Placement<'a> {
+    let node = &scene.nodes[instance.node.index()];
+    if let (Some(skin), Some(influences)) = (node.skin, &scene.part(instance).influences) {
+        let palette = pose.palette(skin);
+        if !palette.is_empty() && influences.per_vertex > 0 {
+            return Placement::Skinned { influences, palette };
+        }
+    }
+    Placement::Whole(world_from_instance(scene, pose, instance))
+}
+
+/// The global transform of an instance's node with that of its copy applied first.
+fn world_from_instance(scene: &Scene, pose: &Pose, instance: PartInstance) -> DAffine3 {
+    let world_from_node = pose.world_from_node(instance.node);
+    let copies = scene.nodes[instance.node.index()].copies.as_deref();
+    match (copies, instance.copy) {
+        (Some(copies), Some(copy)) => {
+            super::transform::product(world_from_node, &super::transform::from_trs(&copies[copy as usize]))
+        }
+        _ => *world_from_node,
+    }
+}
 
 /// Writes the world-space vertices of one part instance: morph, then skin or place, in `f64`, rounded once.
 ///
-/// `out` has the part's vertex count; POSITION accessor order. No allocation.
-pub fn deform(_scene: &Scene, _pose: &Pose, _instance: PartInstance, _out: &mut [Vec3]) {}
-
-/// Unit world-space normal of one vertex at this pose; `None` when the part has no normals or the result
-/// vanishes.
-pub fn vertex_normal(_scene: &Scene, _pose: &Pose, _instance: PartInstance, _vertex: u32) -> Option<Vec3> {
-    None
+/// `out` has the part's vertex count; POSITION accessor order. A skinned part ignores its node's transform and
+/// copies; its weights are divided by their sum, and a vertex whose weights sum to zero follows its first
+/// joint. No allocation, one thread.
+///
+/// # Panics
+/// When `out` has another length than the part has vertices.
+pub fn deform(scene: &Scene, pose: &Pose, instance: PartInstance, out: &mut [Vec3]) {
+    assert_eq!(out.len(), scene.part(instance).positions.len(), "one place a vertex");
+    deform_range(scene, pose, instance, 0, out);
 }
 
-/// Unit world-space tangent of one vertex at this pose and the bitangent's sign; `None` without tangents.
-pub fn vertex_tangent(_scene: &Scene, _pose: &Pose, _instance: PartInstance, _vertex: u32) -> Option<(Vec3, f32)> {
-    None
+/// [`deform`] for the vertices `first .. first + out.len()`.
+///
+/// # Panics
+/// When the range goes past the part's vertices.
+pub fn deform_range(scene: &Scene, pose: &Pose, instance: PartInstance, first: usize, out: &mut [Vec3]) {
+    deform_range_at(SimdLevel::best(), scene, pose, instance, first, out);
+}
+
+/// [`deform_range`] compiled for a given level; the bits do not depend on it.
+///
+/// # Panics
+/// When the range goes past the part's vertices or the machine lacks `level`.
+pub fn deform_range_at(
+    level: SimdLevel,
+    scene: &Scene,
+    pose: &Pose,
+    instance: PartInstance,
+    first: usize,
+    out: &mut [Vec3],
+) {
+    let part = scene.part(instance);
+    assert!(part.positions.len() - first >= out.len(), "range within the part");
+    let weights = pose.weights(instance.node);
+    dispatch(level, Deform { part, weights, placement: placement(scene, pose, instance), first, out });
+}
+
+/// [`deform`] in parallel over ranges of vertices, in the current rayon pool. The same bits.
+///
+/// # Panics
+/// When `out` has another length than the part has vertices.
+pub fn deform_parallel(scene: &Scene, pose: &Pose, instance: PartInstance, out: &mut [Vec3]) {
+    assert_eq!(out.len(), scene.part(instance).positions.len(), "one place a vertex");
+    if out.len() <= DEFORM_GRAIN {
+        return deform_range(scene, pose, instance, 0, out);
+    }
+    out.par_chunks_mut(DEFORM_GRAIN)
+        .enumerate()
+        .for_each(|(chunk, out)| deform_range(scene, pose, instance, chunk * DEFORM_GRAIN, out));
+}
+
+/// The work of one range.
+struct Deform<'a> {
+    part: &'a MeshPart,
+    weights: &'a [f64],
+    placement: Placement<'a>,
+    first: usize,
+    out: &'a mut [Vec3],
+}
+
+impl Task for Deform<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self) {
+        let mut block = [[0.0; 3]; BLOCK];
+        for (k, out) in self.out.chunks_mut(BLOCK).enumerate() {
+            let first = self.first + k * BLOCK;
+            let block = &mut block[..out.len()];
+            morph(self.part, self.weights, first, block);
+            match self.placement {
+                Placement::Whole(matrix) => place(&JointColumns::from(&matrix), block, out),
+                Placement::Skinned { influences, palette } => match influences.per_vertex {
+                    4 => skin::<4>(influences, palette, first, block, out),
+                    8 => skin::<8>(influences, palette, first, block, out),
+                    _ => skin_any(influences, palette, first, block, out),
+                },
+            }
+        }
+    }
+}
+
+/// Rest positions from vertex `first` on, plus the weighted displacements.
+#[inline(always)]
+fn morph(part: &MeshPart, weights: &[f64], first: usize, block: &mut [[f64; 3]]) {
+    let range = first..first + block.len();
+    let flat = block.as_flattened_mut();
+    let rest: &[f32] = bytemuck::cast_slice(&part.positions[range.clone()]);
+    for (v, &p) in flat.iter_mut().zip(rest) {
+        *v = f64::from(p);
+    }
+    for (target, &weight) in part.targets.iter().zip(weights) {
+        if weight == 0.0 || target.positions.is_empty() {
+            continue;
+        }
+        let shift: &[f32] = bytemuck::cast_slice(&target.positions[range.clone()]);
+        for (v, &d) in flat.iter_mut().zip(shift) {
+            *v += weight * f64::from(d);
+        }
+    }
+}
+
+/// One matrix for all vertices of the block.
+#[inline(always)]
+fn place(matrix: &JointColumns, block: &[[f64; 3]], out: &mut [Vec3]) {
+    for (p, out) in block.iter().zip(out) {
+        *out = rounded(&transformed(&matrix.0, p));
+    }
+}
+
+/// A blend of N joint matrices a vertex.
+#[inline(always)]
+fn skin<const N: usize>(
+    influences: &Influences,
+    palette: &[JointColumns],
+    first: usize,
+    block: &[[f64; 3]],
+    out: &mut [Vec3],
+) {
+    let joints = influences.joints[first * N..].as_chunks::<N>().0;
+    let weights = influences.weights[first * N..].as_chunks::<N>().0;
+    for (((p, out), joints), weights) in block.iter().zip(out).zip(joints).zip(weights) {
+        *out = skinned(joints, weights, palette, p);
+    }
+}
+
+/// [`skin`] for any number of influences.
+#[inline(always)]
+fn skin_any(influences: &Influences, palette: &[JointColumns], first: usize, block: &[[f64; 3]], out: &mut [Vec3]) {
+    let n = influences.per_vertex;
+    let joints = influences.joints[first * n..].chunks_exact(n);
+    let weights = influences.weights[first * n..].chunks_exact(n);
+    for (((p, out), joints), weights) in block.iter().zip(out).zip(joints).zip(weights) {
+        *out = skinned(joints, weights, palette, p);
+    }
+}
+
+/// One vertex by the blend of its joints' matrices.
+#[inline(always)]
+fn skinned(joints: &[u16], weights: &[f32], palette: &[JointColumns], p: &[f64; 3]) -> Vec3 {
+    let (mut blend, sum) = blended(joints, weights, palette);
+    if sum == 0.0 {
+        blend = palette[usize::from(joints[0])].0;
+        return rounded(&transformed(&blend, p));
+    }
+    let scale = 1.0 / sum;
+    rounded(&transformed(&blend, p).map(|v| v * scale))
+}
+
+/// The weighted sum of joint matrices, not divided, and the sum of the weights.
+#[inline(always)]
+pub(super) fn blended(joints: &[u16], weights: &[f32], palette: &[JointColumns]) -> ([[f64; 4]; 4], f64) {
+    let mut blend = [[0.0; 4]; 4];
+    let mut sum = 0.0;
+    for (&joint, &weight) in joints.iter().zip(weights) {
+        let weight = f64::from(weight);
+        sum += weight;
+        let columns = &palette[usize::from(joint)].0;
+        for (b, c) in blend.iter_mut().zip(columns) {
+            for (b, c) in b.iter_mut().zip(c) {
+                *b += weight * c;
+            }
+        }
+    }
+    (blend, sum)
+}
+
+/// The matrix with these columns times (p, 1); the fourth entry is 0.
+#[inline(always)]
+fn transformed(columns: &[[f64; 4]; 4], p: &[f64; 3]) -> [f64; 4] {
+    let [x, y, z, t] = columns;
+    std::array::from_fn(|i| x[i] * p[0] + y[i] * p[1] + z[i] * p[2] + t[i])
+}
+
+/// To `f32`, saturating; NaN stays NaN.
+#[inline(always)]
+fn rounded(v: &[f64; 4]) -> Vec3 {
+    const MAX: f64 = f32::MAX as f64;
+    let narrow = |x: f64| x.clamp(-MAX, MAX) as f32;
+    Vec3::new(narrow(v[0]), narrow(v[1]), narrow(v[2]))
 }

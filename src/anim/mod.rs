@@ -4,9 +4,16 @@
 //! input gives the same bytes on every machine.
 
 mod class;
+mod clock;
 mod deform;
+mod normals;
 mod pose;
+mod quat;
+mod sampler;
+mod transform;
 
 pub use class::{MotionClass, classify};
-pub use deform::{deform, vertex_normal, vertex_tangent};
+pub use clock::loop_time;
+pub use deform::{DEFORM_GRAIN, deform, deform_parallel, deform_range, deform_range_at};
+pub use normals::{vertex_normal, vertex_tangent};
 pub use pose::{ActiveClip, Pose};

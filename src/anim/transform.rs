@@ -1,0 +1,68 @@
+//! Local transforms as `f64` matrices that stay finite.
+
+use glam::{DAffine3, DMat3, DMat4, DQuat, DVec3};
+
+use super::quat;
+use crate::scene::{LocalTransform, Trs};
+
+/// Largest magnitude of a matrix entry in a pose.
+///
+/// Products of two such entries and sums of a few of them stay finite, so a chain of scales that runs out of
+/// range saturates instead of ending in NaN.
+const LIMIT: f64 = 1e150;
+
+/// `m` with every entry brought into the range of a pose; NaN stays NaN.
+pub(super) fn saturated(m: &DAffine3) -> DAffine3 {
+    let clamp = |v: DVec3| DVec3::new(v.x.clamp(-LIMIT, LIMIT), v.y.clamp(-LIMIT, LIMIT), v.z.clamp(-LIMIT, LIMIT));
+    DAffine3 {
+        matrix3: DMat3::from_cols(clamp(m.matrix3.x_axis), clamp(m.matrix3.y_axis), clamp(m.matrix3.z_axis)),
+        translation: clamp(m.translation),
+    }
+}
+
+/// `a * b`, saturated.
+pub(super) fn product(a: &DAffine3, b: &DAffine3) -> DAffine3 {
+    saturated(&(*a * *b))
+}
+
+/// The matrix of a translation, rotation and scale; the rotation is normalised first.
+pub(super) fn from_trs(trs: &Trs) -> DAffine3 {
+    saturated(&DAffine3::from_scale_rotation_translation(trs.scale, quat::normalized(trs.rotation), trs.translation))
+}
+
+/// The upper three rows of a matrix whose last row is (0, 0, 0, 1).
+pub(super) fn from_matrix(m: &DMat4) -> DAffine3 {
+    saturated(&DAffine3 {
+        matrix3: DMat3::from_cols(m.x_axis.truncate(), m.y_axis.truncate(), m.z_axis.truncate()),
+        translation: m.w_axis.truncate(),
+    })
+}
+
+/// The matrix of a node's rest placement.
+pub(super) fn local_matrix(local: &LocalTransform) -> DAffine3 {
+    match local {
+        LocalTransform::Trs(trs) => from_trs(trs),
+        LocalTransform::Matrix(m) => from_matrix(m),
+    }
+}
+
+/// The components that channels replace.
+///
+/// A matrix is taken apart, losing its shear; a singular one keeps its column lengths as scale and no
+/// rotation.
+pub(super) fn local_trs(local: &LocalTransform) -> Trs {
+    let m = match local {
+        LocalTransform::Trs(trs) => return *trs,
+        LocalTransform::Matrix(m) => from_matrix(m),
+    };
+    let columns = m.matrix3;
+    let lengths = DVec3::new(columns.x_axis.length(), columns.y_axis.length(), columns.z_axis.length());
+    let det = columns.determinant();
+    if det == 0.0 || !det.is_finite() {
+        return Trs { translation: m.translation, rotation: DQuat::IDENTITY, scale: lengths };
+    }
+    let scale = DVec3::new(lengths.x * det.signum(), lengths.y, lengths.z);
+    let axes =
+        DMat3::from_cols(columns.x_axis / scale.x, columns.y_axis / scale.y, columns.z_axis / scale.z);
+    Trs { translation: m.translation, rotation: quat::normalized(DQuat::from_mat3(&axes)), scale }
+}
