@@ -25,12 +25,7 @@ pub(super) struct JointColumns(pub(super) [[f64; 4]; 4]);
 impl From<&DAffine3> for JointColumns {
     fn from(m: &DAffine3) -> Self {
         let column = |v: glam::DVec3| [v.x, v.y, v.z, 0.0];
-        Self([
-            column(m.matrix3.x_axis),
-            column(m.matrix3.y_axis),
-            column(m.matrix3.z_axis),
-            column(m.translation),
-        ])
+        Self([column(m.matrix3.x_axis), column(m.matrix3.y_axis), column(m.matrix3.z_axis), column(m.translation)])
     }
 }
 
@@ -213,10 +208,7 @@ impl Pose {
 }
 
 /// Every channel of `clips` with its clip and time, in the order in which later ones win.
-fn channels<'a>(
-    scene: &'a Scene,
-    clips: &'a [ActiveClip],
-) -> impl Iterator<Item = (&'a Clip, &'a Channel, f64)> + 'a {
+fn channels<'a>(scene: &'a Scene, clips: &'a [ActiveClip]) -> impl Iterator<Item = (&'a Clip, &'a Channel, f64)> + 'a {
     clips.iter().flat_map(|active| {
         let clip = &scene.clips[active.clip.index()];
         clip.channels.iter().map(move |channel| (clip, channel, active.time_s))

@@ -8,7 +8,11 @@ const STRAIGHT: f64 = 1e-8;
 /// `q` at unit length; the identity for a zero quaternion. NaN and infinite components give NaN.
 pub(super) fn normalized(q: DQuat) -> DQuat {
     let length = q.dot(q).sqrt();
-    if length == 0.0 { DQuat::IDENTITY } else { DQuat::from_xyzw(q.x / length, q.y / length, q.z / length, q.w / length) }
+    if length == 0.0 {
+        DQuat::IDENTITY
+    } else {
+        DQuat::from_xyzw(q.x / length, q.y / length, q.z / length, q.w / length)
+    }
 }
 
 /// The rotation at `alpha` in [0, 1] on the shorter arc from `a` to `b`.

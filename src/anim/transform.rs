@@ -62,7 +62,6 @@ pub(super) fn local_trs(local: &LocalTransform) -> Trs {
         return Trs { translation: m.translation, rotation: DQuat::IDENTITY, scale: lengths };
     }
     let scale = DVec3::new(lengths.x * det.signum(), lengths.y, lengths.z);
-    let axes =
-        DMat3::from_cols(columns.x_axis / scale.x, columns.y_axis / scale.y, columns.z_axis / scale.z);
+    let axes = DMat3::from_cols(columns.x_axis / scale.x, columns.y_axis / scale.y, columns.z_axis / scale.z);
     Trs { translation: m.translation, rotation: quat::normalized(DQuat::from_mat3(&axes)), scale }
 }

@@ -1,15 +1,14 @@
 //! Still and sequence writers, frame lists, resume.
+//!
+//! [`Target`] says where frames go, [`FrameList`] which they are; a file appears under its name only when it
+//! is complete ([`atomic`]).
 
-/// Why frames could not be written.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum OutputError {
-    /// A file could not be written.
-    #[error("{file}: cannot write: {reason}")]
-    Write {
-        /// The file.
-        file: String,
-        /// The system's reason.
-        reason: String,
-    },
-}
+pub mod atomic;
+mod error;
+mod frames;
+mod pattern;
+
+pub use atomic::{AtomicFile, Unfinished};
+pub use error::OutputError;
+pub use frames::{Fps, FrameList, MAX_FRAME, MAX_FRAMES, Shard};
+pub use pattern::{FilmFormat, Pattern, StillFormat, Target};
