@@ -1,10 +1,16 @@
 //! Acceleration structures behind one trait, and the registry of their names.
 
+pub mod list;
 mod query;
+mod registry;
 
-pub use query::{Closest, HitSink, TravRay};
+pub use query::{AnyHit, Closest, HitSink, TravRay};
+pub use registry::{AccelKind, AccelSpec, AnyAccel, SpecError};
 
-use crate::{geom::Triangles, simd::Simd};
+use crate::{
+    geom::{Aabb, Triangles},
+    simd::Simd,
+};
 
 /// Why a structure could not be built.
 #[derive(Debug, thiserror::Error)]
@@ -30,16 +36,9 @@ pub enum BuildError {
         /// How many there are.
         count: usize,
     },
-    /// A setting that the structure does not know or cannot use.
-    #[error("{structure}: setting `{key}`: {reason}")]
-    Setting {
-        /// The structure's name.
-        structure: &'static str,
-        /// The setting's name.
-        key: String,
-        /// What is wrong with it.
-        reason: String,
-    },
+    /// A structure's name or setting that does not exist.
+    #[error(transparent)]
+    Spec(#[from] SpecError),
 }
 
 /// Outcome of a refit.
@@ -84,6 +83,18 @@ pub trait Counter {
 
 impl Counter for () {}
 
+/// Build settings of a structure, as `key=value` pairs.
+pub trait AccelConfig: Default + Clone + std::fmt::Debug + Send + Sync {
+    /// The settings that exist.
+    const KEYS: &'static [&'static str];
+
+    /// Sets one of [`AccelConfig::KEYS`].
+    ///
+    /// # Errors
+    /// What is wrong with the value.
+    fn set(&mut self, key: &str, value: &str) -> Result<(), String>;
+}
+
 /// A structure over triangles that answers rays exactly.
 ///
 /// Every kind returns what `list` returns, bit for bit: the least exact `t`, equal `t` to the lower key.
@@ -91,7 +102,7 @@ pub trait Accel: Sized + Clone + Send + Sync + std::fmt::Debug + 'static {
     /// Name on the command line, in benches and in reports.
     const NAME: &'static str;
     /// Build settings.
-    type Config: Default + Clone + std::fmt::Debug + Send + Sync;
+    type Config: AccelConfig;
 
     /// Builds over `prims`, in the current rayon pool.
     ///
@@ -130,4 +141,26 @@ pub trait Accel: Sized + Clone + Send + Sync + std::fmt::Debug + 'static {
 
     /// Size and quality; O(nodes).
     fn stats(&self) -> AccelStats;
+
+    /// The least box around every triangle whose corners are finite.
+    fn bounds(&self) -> Aabb;
+
+    /// How much dearer rays are expected to be than right after the build, by surface areas: 1 when fresh. O(1).
+    fn decay(&self) -> f64 {
+        1.0
+    }
+}
+
+/// Checks every index of `prims`, and their number against `limit`.
+fn check_indices(structure: &'static str, prims: &Triangles<'_>, limit: usize) -> Result<(), BuildError> {
+    if prims.len() > limit {
+        return Err(BuildError::TooMany { structure, limit, actual: prims.len() });
+    }
+    let count = prims.positions.len();
+    for (prim, corners) in prims.indices.iter().enumerate() {
+        if let Some(&vertex) = corners.iter().find(|&&i| i as usize >= count) {
+            return Err(BuildError::IndexOutOfRange { prim, vertex, count });
+        }
+    }
+    Ok(())
 }

@@ -1,57 +1,212 @@
 //! What one ray carries through structures: its derived values and the best hit so far.
 
-use crate::geom::{Hit, InstanceId, PrimId, Ray, Triangles};
+use std::cmp::Ordering;
+
+use glam::Vec3;
+
+use crate::geom::{
+    Hit, InstanceId, PrimId, Ray, Triangles,
+    exact::{RayRange, TriangleHit},
+};
 
 /// Maps a structure's own triangle numbers to the caller's and decides whether a hit counts.
 ///
 /// Both are asked only about triangles that the ray really hits.
 pub trait HitSink {
+    /// True when `accept` always is: hits that are beaten later are then never rounded.
+    const ACCEPTS_ALL: bool = false;
     /// The (instance, prim) that orders equal `t` and is reported; must be monotone in `prim`.
     fn key(&self, prim: PrimId) -> (InstanceId, PrimId);
     /// False to let the ray pass (alpha tests, layers). `hit` carries the key.
     fn accept(&self, hit: &Hit) -> bool;
 }
 
+/// Accepts every hit and keeps the structure's own numbers, in instance 0.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct AnyHit;
+
+impl HitSink for AnyHit {
+    const ACCEPTS_ALL: bool = true;
+
+    #[inline(always)]
+    fn key(&self, prim: PrimId) -> (InstanceId, PrimId) {
+        (InstanceId(0), prim)
+    }
+
+    #[inline(always)]
+    fn accept(&self, _hit: &Hit) -> bool {
+        true
+    }
+}
+
+/// Magnitudes up to which f32 node tests cannot overflow: 2^60.
+pub(super) const ORDINARY_MAX: f32 = 1_152_921_504_606_846_976.0;
+
+/// Relative widening of reciprocals: 6 * 2^-24, see [`TravRay::inv_near`].
+const WIDEN: f32 = 6.0 / 16_777_216.0;
+
 /// A ray with what traversals derive from it, made once a ray.
 #[derive(Clone, Copy, Debug)]
 pub struct TravRay {
-    ray: Ray,
+    range: RayRange,
+    inv_near: Vec3,
+    inv_far: Vec3,
+    ordinary: bool,
 }
 
 impl TravRay {
-    /// `None` when the ray can hit nothing: NaN, zero direction, empty range.
+    /// `None` when the ray can hit nothing: NaN or infinity in origin or direction, zero direction, empty range.
+    ///
+    /// A negative `t_near` counts as 0.
     #[inline(always)]
     pub fn new(ray: &Ray) -> Option<Self> {
-        Some(Self { ray: *ray })
+        let (t_near, t_far) = (ray.t_near, ray.t_far.min(f32::MAX));
+        // A NaN t_far would be lost in `min`, so it is looked at itself.
+        let valid = ray.origin.is_finite()
+            && ray.dir.is_finite()
+            && ray.dir != Vec3::ZERO
+            && !ray.t_far.is_nan()
+            && t_near <= t_far
+            && t_far >= 0.0;
+        if !valid {
+            return None;
+        }
+        // Adding +0 turns -0 into +0.
+        let dir = ray.dir + Vec3::ZERO;
+        let inv = Vec3::ONE / dir;
+        Some(Self {
+            range: RayRange { origin: ray.origin, dir, t_near: t_near.max(0.0) + 0.0, t_far: t_far + 0.0 },
+            inv_near: inv * (1.0 - WIDEN),
+            inv_far: inv * (1.0 + WIDEN),
+            ordinary: is_ordinary(ray.origin, dir),
+        })
     }
 
-    /// The ray it was made from.
+    /// Line and range, canonical: no -0, range finite and not negative.
     #[inline(always)]
-    pub fn ray(&self) -> &Ray {
-        &self.ray
+    pub fn range(&self) -> &RayRange {
+        &self.range
     }
+
+    /// Reciprocal direction, shrunk: `fl(fl(plane - o) * inv_near)` is at most `(plane - o) / d` where that is not
+    /// negative.
+    ///
+    /// Four roundings (reciprocal, widening, difference, product) make a relative error below 4.01 u with u = 2^-24,
+    /// and the widening is 6 u. Infinite where the direction is 0.
+    #[inline(always)]
+    pub fn inv_near(&self) -> Vec3 {
+        self.inv_near
+    }
+
+    /// Reciprocal direction, grown: `fl(fl(plane - o) * inv_far)` is at least `(plane - o) / d` where that is not
+    /// negative, up to an underflow of 2^-150.
+    #[inline(always)]
+    pub fn inv_far(&self) -> Vec3 {
+        self.inv_far
+    }
+
+    /// True when f32 node tests on boxes within 2^60 of 0 neither overflow nor lose precision by underflow.
+    #[inline(always)]
+    pub fn is_ordinary(&self) -> bool {
+        self.ordinary
+    }
+}
+
+/// True when every nonzero |dir| component is in [2^-60, 2^60] and |origin| is at most 2^60.
+#[inline(always)]
+fn is_ordinary(origin: Vec3, dir: Vec3) -> bool {
+    let size = dir.abs();
+    let large_enough = size.cmpge(Vec3::splat(1.0 / ORDINARY_MAX)) | size.cmpeq(Vec3::ZERO);
+    let small_enough = size.max(origin.abs()).cmple(Vec3::splat(ORDINARY_MAX));
+    (large_enough & small_enough).all()
 }
 
 /// The least exact hit so far, over any number of structures.
 #[derive(Clone, Copy, Debug)]
 pub struct Closest {
-    hit: Option<Hit>,
+    best: Option<(TriangleHit, InstanceId, PrimId)>,
+    /// At least the exact t of the best hit, or the ray's end.
+    t_high: f64,
+    /// At least `t_high`.
+    cull: f32,
 }
 
 impl Closest {
     /// Nothing hit yet.
     #[inline(always)]
-    pub fn new(_ray: &TravRay) -> Self {
-        Self { hit: None }
+    pub fn new(ray: &TravRay) -> Self {
+        Self { best: None, t_high: f64::from(ray.range.t_far), cull: ray.range.t_far }
     }
 
-    /// The answer.
+    /// Nothing beyond this `t` can change the answer: at least the best hit's exact t, or the ray's end.
     #[inline(always)]
-    pub fn hit(&self) -> Option<Hit> {
-        self.hit
+    pub fn t_cull(&self) -> f32 {
+        self.cull
+    }
+
+    /// As [`Closest::t_cull`], tighter.
+    #[inline(always)]
+    pub fn t_high(&self) -> f64 {
+        self.t_high
+    }
+
+    /// The answer, rounded; `ray` must be the one that the hits were offered with.
+    #[inline(always)]
+    pub fn hit(&self, ray: &TravRay) -> Option<Hit> {
+        let (hit, instance, prim) = self.best.as_ref()?;
+        Some(rounded(hit, ray, *instance, *prim))
     }
 
     /// Tests one triangle exactly and keeps it when it beats the best.
     #[inline(always)]
-    pub fn offer<K: HitSink>(&mut self, _ray: &TravRay, _prims: &Triangles<'_>, _prim: PrimId, _sink: &K) {}
+    pub fn offer<K: HitSink>(&mut self, ray: &TravRay, prims: &Triangles<'_>, prim: PrimId, sink: &K) {
+        if let Some(hit) = TriangleHit::test(&ray.range, prims.corners(prim)) {
+            self.keep(hit, ray, prim, sink);
+        }
+    }
+
+    /// Keeps `hit` when it beats the best and `sink` accepts it.
+    #[inline(always)]
+    pub fn keep<K: HitSink>(&mut self, hit: TriangleHit, ray: &TravRay, prim: PrimId, sink: &K) {
+        if hit.t_low() > self.t_high {
+            return;
+        }
+        let (instance, prim) = sink.key(prim);
+        if let Some((best, best_instance, best_prim)) = &self.best {
+            match hit.cmp_t(best, &ray.range) {
+                Ordering::Greater => return,
+                Ordering::Equal if (*best_instance, *best_prim) <= (instance, prim) => return,
+                _ => {}
+            }
+        }
+        if !K::ACCEPTS_ALL && !sink.accept(&rounded(&hit, ray, instance, prim)) {
+            return;
+        }
+        self.best = Some((hit, instance, prim));
+        self.t_high = hit.t_high();
+        self.cull = round_up(hit.t_high());
+    }
+}
+
+/// Whether a hit of one triangle counts for an occlusion query.
+#[inline(always)]
+pub(super) fn blocks<K: HitSink>(hit: &TriangleHit, ray: &TravRay, prim: PrimId, sink: &K) -> bool {
+    if K::ACCEPTS_ALL {
+        return true;
+    }
+    let (instance, prim) = sink.key(prim);
+    sink.accept(&rounded(hit, ray, instance, prim))
+}
+
+#[inline(always)]
+fn rounded(hit: &TriangleHit, ray: &TravRay, instance: InstanceId, prim: PrimId) -> Hit {
+    let [t, u, v] = hit.tuv(&ray.range);
+    Hit { t, u, v, prim, instance }
+}
+
+/// The least f32 that is not below `t`; `t` must not exceed the range of f32 by more than a rounding.
+#[inline(always)]
+fn round_up(t: f64) -> f32 {
+    let near = t as f32;
+    if f64::from(near) < t { near.next_up() } else { near }
 }

@@ -54,7 +54,7 @@ impl From<ImportError> for CliError {
 impl From<BuildError> for CliError {
     fn from(error: BuildError) -> Self {
         match error {
-            BuildError::Setting { .. } => Self::Usage(error.to_string()),
+            BuildError::Spec(_) => Self::Usage(error.to_string()),
             _ => Self::Failed(error.to_string()),
         }
     }

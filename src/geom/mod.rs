@@ -1,6 +1,7 @@
 //! Plain geometric values: boxes, rays, hits, borrowed triangle views. No allocation.
 
 mod aabb;
+pub mod exact;
 mod hit;
 mod ray;
 mod triangles;

@@ -41,4 +41,15 @@ impl Triangles<'_> {
         let [a, b, c] = self.corners(prim);
         Aabb { min: a.min(b).min(c), max: a.max(b).max(c) }
     }
+
+    /// The least box around a triangle, empty when a corner is not finite: such triangles are never hit.
+    #[inline(always)]
+    pub fn finite_aabb(&self, prim: PrimId) -> Aabb {
+        let [a, b, c] = self.corners(prim);
+        if a.is_finite() && b.is_finite() && c.is_finite() {
+            Aabb { min: a.min(b).min(c), max: a.max(b).max(c) }
+        } else {
+            Aabb::EMPTY
+        }
+    }
 }

@@ -1,14 +1,41 @@
-use std::{fmt, str::FromStr};
+use std::{fmt, str::FromStr, sync::LazyLock};
 
 /// An instruction set that kernels are compiled for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum SimdLevel {
     /// Portable code.
     Scalar,
-    /// AVX2 with FMA.
+    /// AVX2 with FMA, BMI1, BMI2 and LZCNT.
     Avx2,
-    /// AVX-512 F, VL, BW, DQ.
+    /// AVX-512 F, VL, BW, DQ besides.
     Avx512,
+}
+
+/// Detection runs once: `cpuid` is a call into the hypervisor on some machines.
+static BEST: LazyLock<SimdLevel> = LazyLock::new(detect);
+
+#[cfg(target_arch = "x86_64")]
+fn detect() -> SimdLevel {
+    let avx2 = is_x86_feature_detected!("avx2")
+        && is_x86_feature_detected!("fma")
+        && is_x86_feature_detected!("bmi1")
+        && is_x86_feature_detected!("bmi2")
+        && is_x86_feature_detected!("lzcnt")
+        && is_x86_feature_detected!("popcnt");
+    let avx512 = is_x86_feature_detected!("avx512f")
+        && is_x86_feature_detected!("avx512vl")
+        && is_x86_feature_detected!("avx512bw")
+        && is_x86_feature_detected!("avx512dq");
+    match (avx2, avx512) {
+        (true, true) => SimdLevel::Avx512,
+        (true, false) => SimdLevel::Avx2,
+        (false, _) => SimdLevel::Scalar,
+    }
+}
+
+#[cfg(not(target_arch = "x86_64"))]
+fn detect() -> SimdLevel {
+    SimdLevel::Scalar
 }
 
 impl SimdLevel {
@@ -17,15 +44,17 @@ impl SimdLevel {
 
     /// The highest level of this machine; detected once.
     pub fn best() -> Self {
-        Self::ALL.into_iter().rev().find(|l| l.is_available()).unwrap_or(Self::Scalar)
+        *BEST
     }
 
     /// True when this machine has every feature that the level uses.
     pub fn is_available(self) -> bool {
-        match self {
-            Self::Scalar => true,
-            Self::Avx2 | Self::Avx512 => false,
-        }
+        self <= *BEST
+    }
+
+    /// The levels of this machine, least first.
+    pub fn available() -> impl Iterator<Item = Self> {
+        Self::ALL.into_iter().filter(|l| l.is_available())
     }
 
     /// `scalar`, `avx2` or `avx512`.
@@ -50,35 +79,4 @@ impl FromStr for SimdLevel {
     fn from_str(s: &str) -> Result<Self, String> {
         Self::ALL.into_iter().find(|l| l.name() == s).ok_or_else(|| format!("unknown SIMD level `{s}`"))
     }
-}
-
-/// The wide types of one level. Sealed by construction: only this module implements it.
-pub trait Simd: Copy + Send + Sync + 'static {
-    /// The level that the implementor stands for.
-    const LEVEL: SimdLevel;
-}
-
-/// Portable code.
-#[derive(Clone, Copy, Debug)]
-pub struct Scalar;
-
-impl Simd for Scalar {
-    const LEVEL: SimdLevel = SimdLevel::Scalar;
-}
-
-/// Work that can be compiled for any level. `run` must be `#[inline(always)]`.
-pub trait Task {
-    /// What the work returns.
-    type Output;
-    /// Does the work with the level's types.
-    fn run<S: Simd>(self) -> Self::Output;
-}
-
-/// Runs `task` compiled for `level`. Enter once a tile or batch: the call itself cannot be inlined.
-///
-/// # Panics
-/// When the machine lacks `level`.
-pub fn dispatch<T: Task>(level: SimdLevel, task: T) -> T::Output {
-    assert!(level.is_available(), "this machine has no {level}");
-    task.run::<Scalar>()
 }

@@ -5,6 +5,14 @@
 //! is compiled for the level. Results never depend on the level: no kernel contracts `a * b + c` where a
 //! result is kept.
 
+mod dispatch;
+mod lanes;
 mod level;
+mod scalar;
+#[cfg(target_arch = "x86_64")]
+mod x86;
 
-pub use level::{Scalar, Simd, SimdLevel, Task, dispatch};
+pub use dispatch::{Task, dispatch};
+pub use lanes::Simd;
+pub use level::SimdLevel;
+pub use scalar::Scalar;

@@ -1,0 +1,139 @@
+use std::cmp::Ordering;
+
+use glam::Vec3;
+
+use super::{
+    estimate::{Estimate, Verdict},
+    volumes::Volumes,
+};
+
+/// A ray's line and the finite closed range of `t` that counts.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RayRange {
+    /// Start point, finite.
+    pub origin: Vec3,
+    /// Direction, finite and not zero.
+    pub dir: Vec3,
+    /// Least parameter, finite and not negative.
+    pub t_near: f32,
+    /// Greatest parameter, finite.
+    pub t_far: f32,
+}
+
+/// A triangle that a ray surely hits, with t, u and v known as closely as has been needed so far.
+#[derive(Clone, Copy, Debug)]
+pub struct TriangleHit {
+    corners: [Vec3; 3],
+    estimate: Estimate,
+    t_low: f64,
+    t_high: f64,
+}
+
+impl TriangleHit {
+    /// Decides whether `ray` hits the closed triangle within its range. Corners that are not finite are never hit.
+    pub fn test(ray: &RayRange, corners: [Vec3; 3]) -> Option<Self> {
+        let estimate = Estimate::new(ray.origin, ray.dir, &corners);
+        match estimate.verdict() {
+            Verdict::Miss => None,
+            Verdict::Meets => Self::from_sure(ray, corners, estimate),
+            Verdict::Doubt => Self::exactly(ray, corners),
+        }
+    }
+
+    /// As [`TriangleHit::test`] for a triangle whose estimate already shows that the line meets its inside and that
+    /// `|det| >= 4 det_error`.
+    #[inline(always)]
+    pub fn from_sure(ray: &RayRange, corners: [Vec3; 3], estimate: Estimate) -> Option<Self> {
+        let hit = Self::with_interval(corners, estimate);
+        if hit.t_high < f64::from(ray.t_near) || hit.t_low > f64::from(ray.t_far) {
+            None
+        } else if hit.t_low >= f64::from(ray.t_near) && hit.t_high <= f64::from(ray.t_far) {
+            Some(hit)
+        } else {
+            Self::exactly(ray, corners)
+        }
+    }
+
+    /// As [`TriangleHit::test`], by integers alone.
+    #[cold]
+    #[inline(never)]
+    pub fn exactly(ray: &RayRange, corners: [Vec3; 3]) -> Option<Self> {
+        let volumes = Volumes::new(ray.origin, ray.dir, &corners)?;
+        let inside = volumes.meets()
+            && volumes.cmp_t_to(ray.t_near) != Ordering::Less
+            && volumes.cmp_t_to(ray.t_far) != Ordering::Greater;
+        inside.then(|| Self::with_interval(corners, volumes.estimate()))
+    }
+
+    #[inline(always)]
+    fn with_interval(corners: [Vec3; 3], estimate: Estimate) -> Self {
+        let (t, error) = estimate.quotient(estimate.t, estimate.t_error);
+        Self { corners, estimate, t_low: t - error, t_high: t + error }
+    }
+
+    /// At most the exact t.
+    #[inline(always)]
+    pub fn t_low(&self) -> f64 {
+        self.t_low
+    }
+
+    /// At least the exact t.
+    #[inline(always)]
+    pub fn t_high(&self) -> f64 {
+        self.t_high
+    }
+
+    /// Compares the exact t of two hits of the same ray.
+    #[inline(always)]
+    pub fn cmp_t(&self, other: &Self, ray: &RayRange) -> Ordering {
+        if self.t_high < other.t_low {
+            Ordering::Less
+        } else if self.t_low > other.t_high {
+            Ordering::Greater
+        } else {
+            self.cmp_t_exactly(other, ray)
+        }
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn cmp_t_exactly(&self, other: &Self, ray: &RayRange) -> Ordering {
+        if self.corners == other.corners {
+            return Ordering::Equal;
+        }
+        match (self.volumes(ray), other.volumes(ray)) {
+            (Some(a), Some(b)) => a.cmp_t(&b),
+            _ => Ordering::Equal,
+        }
+    }
+
+    fn volumes(&self, ray: &RayRange) -> Option<Volumes> {
+        Volumes::new(ray.origin, ray.dir, &self.corners)
+    }
+
+    /// The exact t, u, v, each rounded to the nearest f32.
+    #[inline(always)]
+    pub fn tuv(&self, ray: &RayRange) -> [f32; 3] {
+        let e = &self.estimate;
+        let t = agreed(self.t_low, self.t_high);
+        let (u, u_error) = e.quotient(e.u, e.uv_error);
+        let (v, v_error) = e.quotient(e.v, e.uv_error);
+        match (t, agreed(u - u_error, u + u_error), agreed(v - v_error, v + v_error)) {
+            (Some(t), Some(u), Some(v)) => [t, u, v],
+            _ => self.tuv_exactly(ray),
+        }
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn tuv_exactly(&self, ray: &RayRange) -> [f32; 3] {
+        self.volumes(ray).map_or([0.0; 3], |x| [x.t_f32(), x.u_f32(), x.v_f32()])
+    }
+}
+
+/// The f32 that both ends of an interval round to; 0 is +0.
+#[inline(always)]
+fn agreed(low: f64, high: f64) -> Option<f32> {
+    let (low, high) = (low as f32, high as f32);
+    (low == high).then_some(low + 0.0)
+}
