@@ -234,10 +234,16 @@ fn transformed(columns: &[[f64; 4]; 4], p: &[f64; 3]) -> [f64; 4] {
     std::array::from_fn(|i| x[i] * p[0] + y[i] * p[1] + z[i] * p[2] + t[i])
 }
 
-/// To `f32`, saturating; NaN stays NaN.
+/// One point of mesh space placed by a matrix, as a vertex is.
+pub(super) fn placed(matrix: &DAffine3, p: Vec3) -> Vec3 {
+    rounded(&transformed(&JointColumns::from(matrix).0, &p.as_dvec3().to_array()))
+}
+
+/// To `f32`, saturating; NaN stays NaN, and zero has no sign: where a channel holds the rest value but for the
+/// sign of a zero, the bits stay the same.
 #[inline(always)]
 fn rounded(v: &[f64; 4]) -> Vec3 {
     const MAX: f64 = f32::MAX as f64;
-    let narrow = |x: f64| x.clamp(-MAX, MAX) as f32;
+    let narrow = |x: f64| x.clamp(-MAX, MAX) as f32 + 0.0;
     Vec3::new(narrow(v[0]), narrow(v[1]), narrow(v[2]))
 }

@@ -3,6 +3,7 @@
 //! Key times and the pose are `f64`; transcendental functions come from the `libm` crate, so that the same
 //! input gives the same bytes on every machine.
 
+mod bounds;
 mod class;
 mod clock;
 mod deform;
@@ -12,6 +13,7 @@ mod quat;
 mod sampler;
 mod transform;
 
+pub use bounds::animation_bounds;
 pub use class::{MotionClass, classify};
 pub use clock::loop_time;
 pub use deform::{DEFORM_GRAIN, deform, deform_parallel, deform_range, deform_range_at};

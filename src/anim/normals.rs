@@ -5,6 +5,7 @@ use glam::{DAffine3, DMat3, DVec3, Vec3};
 use super::{
     Pose,
     deform::{Placement, blended, placement},
+    transform::scaled_to_one,
 };
 use crate::scene::{PartInstance, Scene};
 
@@ -40,7 +41,7 @@ pub fn vertex_tangent(scene: &Scene, pose: &Pose, instance: PartInstance, vertex
             tangent += shift.as_dvec3() * weight;
         }
     }
-    let matrix = scaled_to_one(&vertex_matrix(scene, pose, instance, v).matrix3);
+    let (matrix, _) = scaled_to_one(&vertex_matrix(scene, pose, instance, v).matrix3);
     let side = if matrix.determinant() < 0.0 { -1.0 } else { 1.0 };
     let sign = if stored.w < 0.0 { -1.0 } else { 1.0 };
     Some((unit(matrix * tangent)?, sign * side))
@@ -65,16 +66,10 @@ fn vertex_matrix(scene: &Scene, pose: &Pose, instance: PartInstance, vertex: usi
     DAffine3 { matrix3: DMat3::from_cols(column(x), column(y), column(z)), translation: column(t) }
 }
 
-/// `m` divided by its largest entry, so that products of entries neither overflow nor vanish.
-fn scaled_to_one(m: &DMat3) -> DMat3 {
-    let largest = m.x_axis.abs().max(m.y_axis.abs()).max(m.z_axis.abs()).max_element();
-    if largest > 0.0 { *m * (1.0 / largest) } else { *m }
-}
-
 /// The cofactor matrix (determinant times inverse transpose) of `m` up to a positive factor, and the sign of
 /// the determinant, 1 when it is zero.
 fn cofactors(m: &DMat3) -> (DMat3, f64) {
-    let m = scaled_to_one(m);
+    let (m, _) = scaled_to_one(m);
     let (x, y, z) = (m.x_axis, m.y_axis, m.z_axis);
     let side = if m.determinant() < 0.0 { -1.0 } else { 1.0 };
     (DMat3::from_cols(y.cross(z), z.cross(x), x.cross(y)), side)

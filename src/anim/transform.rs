@@ -65,3 +65,10 @@ pub(super) fn local_trs(local: &LocalTransform) -> Trs {
     let axes = DMat3::from_cols(columns.x_axis / scale.x, columns.y_axis / scale.y, columns.z_axis / scale.z);
     Trs { translation: m.translation, rotation: quat::normalized(DQuat::from_mat3(&axes)), scale }
 }
+
+/// `m` divided by its largest entry, so that products of entries neither overflow nor vanish, and that entry's
+/// magnitude. A zero matrix stays.
+pub(super) fn scaled_to_one(m: &DMat3) -> (DMat3, f64) {
+    let largest = m.x_axis.abs().max(m.y_axis.abs()).max(m.z_axis.abs()).max_element();
+    if largest > 0.0 { (*m * (1.0 / largest), largest) } else { (*m, 0.0) }
+}

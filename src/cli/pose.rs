@@ -3,6 +3,11 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use kinora::{
+    anim::Pose,
+    glam::DAffine3,
+    output::{AtomicFile, PosClips, Unfinished, atomic, write_pos},
+};
 
 use super::{
     error::CliError,
@@ -18,7 +23,7 @@ pub(crate) struct PoseArgs {
     #[arg(long, value_name = "INDEX|NAME|all|none", help = ANIMATION_HELP)]
     animation: Option<String>,
     /// Time on the animation's clock in seconds
-    #[arg(long, value_name = "SECONDS", default_value_t = 0.0)]
+    #[arg(long, value_name = "SECONDS", default_value_t = 0.0, allow_negative_numbers = true)]
     time: f64,
     /// File to write
     #[arg(long, value_name = "FILE")]
@@ -30,8 +35,23 @@ pub(crate) struct PoseArgs {
 /// # Errors
 /// When the scene cannot be loaded or the file cannot be written.
 pub(crate) fn run(args: &PoseArgs, settings: &Settings) -> Result<(), CliError> {
+    if !args.time.is_finite() {
+        return Err(CliError::usage(format!("--time {}: expected a finite number of seconds", args.time)));
+    }
     let scene = scene::load(args.scene.as_deref(), settings)?;
     let clips = scene::select_clips(&scene, args.animation.as_deref())?;
-    let _active = scene::at_time(&clips, args.time);
-    Err(CliError::failed(format!("{}: cannot write", args.output.display())))
+    let label = match (clips.as_slice(), args.animation.as_deref()) {
+        (_, Some("all")) => PosClips::All,
+        (&[clip], _) => PosClips::One(clip),
+        _ => PosClips::None,
+    };
+    let mut pose = Pose::rest(&scene);
+    pose.evaluate(&scene, &scene::at_time(&clips, args.time), &DAffine3::IDENTITY);
+    atomic::prepare(&args.output)?;
+    let mut file = AtomicFile::create(&args.output, &Unfinished::default())?;
+    settings
+        .pool
+        .install(|| write_pos(&scene, &pose, label, args.time, &mut file))
+        .map_err(|e| CliError::failed(format!("{}: cannot write: {e}", args.output.display())))?;
+    Ok(file.finish()?)
 }

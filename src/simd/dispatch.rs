@@ -1,6 +1,6 @@
-use super::{Scalar, Simd, SimdLevel};
 #[cfg(target_arch = "x86_64")]
 use super::x86::{Avx2, Avx512};
+use super::{Scalar, Simd, SimdLevel};
 
 /// Work that can be compiled for any level. `run` must be `#[inline(always)]`.
 pub trait Task {

@@ -19,8 +19,7 @@ impl Scaled {
         let bits = value.to_bits();
         let biased = ((bits >> 23) & 0xff).cast_signed();
         let fraction = (bits & 0x007f_ffff).cast_signed();
-        let (mantissa, exponent) =
-            if biased == 0 { (fraction, -149) } else { (fraction | 0x0080_0000, biased - 150) };
+        let (mantissa, exponent) = if biased == 0 { (fraction, -149) } else { (fraction | 0x0080_0000, biased - 150) };
         if mantissa == 0 {
             return Self { mantissa: 0, exponent: i32::MAX };
         }
@@ -34,7 +33,11 @@ impl Scaled {
 
     /// `value / 2^exponent`, an integer.
     fn to_int(self, exponent: i32) -> Int {
-        if self.mantissa == 0 { Int::ZERO } else { Int::from_scaled(self.mantissa, (self.exponent - exponent).unsigned_abs()) }
+        if self.mantissa == 0 {
+            Int::ZERO
+        } else {
+            Int::from_scaled(self.mantissa, (self.exponent - exponent).unsigned_abs())
+        }
     }
 }
 
@@ -137,14 +140,6 @@ impl Volumes {
         let (det, t) = (self.det.to_f64(unit), self.t.to_f64(3 * self.position_exponent));
         let (u, v) = (self.u.to_f64(unit), self.v.to_f64(unit));
         let error = |x: f64| x.abs() * f64::EPSILON;
-        Estimate {
-            det,
-            u,
-            v,
-            t,
-            det_error: error(det),
-            uv_error: error(u).max(error(v)),
-            t_error: error(t),
-        }
+        Estimate { det, u, v, t, det_error: error(det), uv_error: error(u).max(error(v)), t_error: error(t) }
     }
 }
