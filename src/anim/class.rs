@@ -1,6 +1,4 @@
-use crate::scene::{
-    Channel, ChannelTarget, Clip, Interpolation, LocalTransform, NodeId, PartInstance, Sampler, Scene,
-};
+use crate::scene::{Channel, ChannelTarget, Clip, Interpolation, LocalTransform, NodeId, PartInstance, Sampler, Scene};
 
 use super::transform::{from_matrix, scaled_to_one};
 
@@ -31,8 +29,7 @@ const MAX_STRETCH: f64 = 1e12;
 /// Cost: O(nodes + keys + joints).
 pub fn classify(scene: &Scene) -> Vec<MotionClass> {
     let drives = Drives::new(scene);
-    let skin_moves: Vec<bool> =
-        scene.skins.iter().map(|s| s.joints.iter().any(|j| drives.moves[j.index()])).collect();
+    let skin_moves: Vec<bool> = scene.skins.iter().map(|s| s.joints.iter().any(|j| drives.moves[j.index()])).collect();
     scene.instances.iter().map(|&instance| class(scene, &drives, &skin_moves, instance)).collect()
 }
 

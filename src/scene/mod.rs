@@ -4,6 +4,7 @@
 //! a [`Scene`] is in range, every node's parent chain is finite, and every attribute array of a
 //! [`MeshPart`] has the part's vertex count: importers guarantee it, readers rely on it.
 
+pub mod builtin;
 mod camera;
 mod clip;
 mod ids;

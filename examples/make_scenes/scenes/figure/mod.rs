@@ -1,0 +1,105 @@
+//! `walk`: a skinned figure that walks on a belt of slats.
+
+mod body;
+mod gait;
+mod paint;
+mod rig;
+mod weights;
+
+use glam::{DQuat, DVec3};
+
+use super::{
+    glb::{Animation, Glb, Keys, Node},
+    maths::deg,
+    nets::{self, Surface},
+    sdf,
+};
+use body::Body;
+use rig::JOINTS;
+
+/// Gait cycles in the clip: in two of them every slat of the belt comes round once.
+const CYCLES: usize = 2;
+const KEYS_PER_CYCLE: usize = 30;
+
+/// The file, with a figure whose mesh is finer by `detail` (1 for the one shipped).
+pub fn walk(detail: f64) -> Vec<u8> {
+    let body = Body::new();
+    let surface = sculpt(&body, detail);
+    let mut glb = Glb::default();
+    let mut animation = Animation::default();
+    let joints = rig_nodes(&mut glb);
+    animate(&mut glb, &mut animation, &joints);
+    let mesh = skin_mesh(&mut glb, &body, &surface);
+    let binds: Vec<DVec3> = JOINTS.iter().map(|j| -j.position()).collect();
+    let binds = glb.translation_matrices(&binds);
+    let skin = Some(glb.skin("figure", &joints, binds));
+    let figure = glb.node(Node { name: "figure".into(), mesh: Some(mesh), skin, ..Node::default() });
+    let camera = glb.camera("three-quarter", DVec3::new(1.75, 1.30, 2.85), DVec3::new(0.0, 0.80, 0.0), deg(31.0));
+    glb.animation("walk", &animation);
+    glb.finish(&[joints[0], figure, camera])
+}
+
+/// The figure's surface as an even mesh, finer at hands and head.
+fn sculpt(body: &Body, detail: f64) -> Surface {
+    let field = |p: DVec3| body.distance(p);
+    let base = 0.0195 / detail;
+    let x = |x: f64| if x.abs() > 0.40 { 0.72 * base } else { base };
+    let y = |y: f64| if y > 1.36 || y < 0.12 { 0.85 * base } else { 1.12 * base };
+    let axes = [
+        nets::grid_lines(-0.62, 0.62, x),
+        nets::grid_lines(-0.03, 1.70, y),
+        nets::grid_lines(-0.20, 0.25, |_| 0.92 * base),
+    ];
+    let mut surface = nets::extract(&field, &axes);
+    surface.relax(&field, 8);
+    surface
+}
+
+fn rig_nodes(glb: &mut Glb) -> Vec<usize> {
+    let first = 0;
+    for joint in JOINTS {
+        let children = JOINTS.iter().filter(|c| c.parent() == Some(joint)).map(|&c| first + c as usize).collect();
+        let origin = joint.parent().map_or(DVec3::ZERO, rig::Joint::position);
+        glb.node(Node { name: joint.name(), translation: joint.position() - origin, children, ..Node::default() });
+    }
+    (first..first + JOINTS.len()).collect()
+}
+
+fn animate(glb: &mut Glb, animation: &mut Animation, joints: &[usize]) {
+    let count = CYCLES * KEYS_PER_CYCLE;
+    let times: Vec<f64> = (0..=count).map(|k| gait::CYCLE * k as f64 / KEYS_PER_CYCLE as f64).collect();
+    // The last key repeats the first: phases are taken within one cycle.
+    let postures: Vec<gait::Posture> =
+        (0..=count).map(|k| gait::posture((k % KEYS_PER_CYCLE) as f64 / KEYS_PER_CYCLE as f64)).collect();
+    let input = glb.scalars(&times);
+    let places: Vec<DVec3> = postures.iter().map(|p| p.hips).collect();
+    let output = glb.vectors(&places);
+    let sampler = animation.sampler(Keys::Linear, input, output);
+    animation.channel(sampler, joints[0], "translation");
+    for joint in JOINTS {
+        let turns: Vec<DQuat> = postures.iter().map(|p| p.rotations[joint as usize]).collect();
+        let output = glb.rotations(&turns);
+        let sampler = animation.sampler(Keys::Linear, input, output);
+        animation.channel(sampler, joints[joint as usize], "rotation");
+    }
+}
+
+fn skin_mesh(glb: &mut Glb, body: &Body, surface: &Surface) -> usize {
+    let field = |p: DVec3| body.distance(p);
+    let normals: Vec<DVec3> = surface.positions.iter().map(|&p| sdf::normal(&field, p, 2e-3)).collect();
+    let influences = weights::bind(surface);
+    let joints: Vec<[u8; 4]> = influences.iter().map(|i| i.joints).collect();
+    let weights: Vec<[f64; 4]> = influences.iter().map(|i| i.weights).collect();
+    let colors: Vec<[f64; 4]> = surface.positions.iter().map(|&p| paint::linear(paint::color(body, p))).collect();
+    let attributes = [
+        ("POSITION", glb.positions(&surface.positions)),
+        ("NORMAL", glb.vectors(&normals)),
+        ("COLOR_0", glb.quads(&colors)),
+        ("JOINTS_0", glb.bytes4(&joints, false)),
+        ("WEIGHTS_0", glb.quads(&weights)),
+    ];
+    let indices = glb.triangles(&surface.triangles);
+    let material =
+        glb.material("\"name\":\"figure\",\"pbrMetallicRoughness\":{\"metallicFactor\":0,\"roughnessFactor\":0.75}");
+    glb.mesh("figure", &attributes, indices, material)
+}
