@@ -11,6 +11,9 @@
 
 pub use glam;
 
+#[cfg(test)]
+extern crate self as kinora;
+
 pub mod accel;
 pub mod anim;
 pub mod dynamics;

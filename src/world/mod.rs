@@ -1,15 +1,30 @@
 //! The immutable snapshot that readers hold: one frame's geometry and the structures over it.
+//!
+//! Part instances are held in groups: each has its world-space vertices, its triangles over them and one
+//! structure. A [`top`](TopKind) level finds the groups that a ray may hit. How instances are grouped
+//! changes no byte of any answer: a group's own triangle numbers are ordered as (instance, prim), the best
+//! hit is shared over groups, and boxes only prove misses.
 
-use std::sync::Arc;
+mod group;
+mod query;
+mod sink;
+mod slab;
+mod top;
+mod top_tree;
+
+use std::{fmt, sync::Arc};
 
 use glam::Vec3;
 
 use crate::{
     anim::Pose,
-    geom::{Aabb, Hit, InstanceId, PrimId, Ray},
+    geom::{Aabb, InstanceId, PrimId},
     scene::{PartInstance, Scene},
-    simd::Simd,
 };
+
+pub(crate) use group::{GroupFrame, GroupLayout};
+pub(crate) use top::Top;
+pub use top::TopKind;
 
 /// One part instance of a world: which actor it belongs to and what it is there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -20,30 +35,51 @@ pub struct WorldInstance {
     pub part: PartInstance,
 }
 
+/// Where an instance's vertices lie.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Place {
+    pub(crate) group: u32,
+    pub(crate) first_vertex: u32,
+    pub(crate) vertex_count: u32,
+}
+
+/// One frame of an actor.
+#[derive(Clone, Debug)]
+pub(crate) struct ActorFrame {
+    pub(crate) scene: Arc<Scene>,
+    pub(crate) pose: Arc<Pose>,
+}
+
 /// One frame: world-space vertices, the structures over them, and the pose they came from.
 ///
-/// Cheap to clone the `Arc` around it; holds its buffers as long as it lives.
-#[derive(Debug)]
+/// Cheap to clone the `Arc` around it; holds its buffers as long as it lives. Queries are safe from any
+/// number of threads.
+#[derive(Default)]
 pub struct World {
     pub(crate) instances: Arc<[WorldInstance]>,
+    pub(crate) places: Arc<[Place]>,
+    pub(crate) actors: Vec<ActorFrame>,
+    pub(crate) groups: Vec<GroupFrame>,
+    pub(crate) top: Top,
+}
+
+impl fmt::Debug for World {
+    /// Sizes only: the contents fill pages.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("World")
+            .field("actors", &self.actors.len())
+            .field("instances", &self.instances.len())
+            .field("groups", &self.groups.len())
+            .field("triangles", &self.triangle_count())
+            .field("bounds", &self.bounds())
+            .finish_non_exhaustive()
+    }
 }
 
 impl World {
-    /// The nearest hit that `filter` accepts: least exact `t`, equal `t` to the lower (instance, prim).
-    #[inline(always)]
-    pub fn closest_hit<S: Simd, F: Fn(&Hit) -> bool>(&self, _ray: &Ray, _filter: &F) -> Option<Hit> {
-        None
-    }
-
-    /// True when anything that `filter` accepts is hit within the ray's range.
-    #[inline(always)]
-    pub fn is_occluded<S: Simd, F: Fn(&Hit) -> bool>(&self, _ray: &Ray, _filter: &F) -> bool {
-        false
-    }
-
-    /// The least box around everything traced.
+    /// The least box around everything traced: the triangles with finite corners.
     pub fn bounds(&self) -> Aabb {
-        Aabb::EMPTY
+        self.groups.iter().fold(Aabb::EMPTY, |all, group| all.union(group.bounds))
     }
 
     /// All part instances; an [`InstanceId`] is an index here.
@@ -51,12 +87,24 @@ impl World {
         &self.instances
     }
 
-    /// World-space vertices of an instance in POSITION accessor order.
-    pub fn positions(&self, _instance: InstanceId) -> &[Vec3] {
-        &[]
+    /// Number of triangles, over all instances.
+    pub fn triangle_count(&self) -> usize {
+        self.groups.iter().map(|group| group.layout.indices.len()).sum()
     }
 
-    /// World-space corners of a triangle.
+    /// Number of groups, each with its own structure.
+    pub fn group_count(&self) -> usize {
+        self.groups.len()
+    }
+
+    /// World-space vertices of an instance in POSITION accessor order. Panics when `instance` is out of range.
+    pub fn positions(&self, instance: InstanceId) -> &[Vec3] {
+        let place = self.places[instance.0 as usize];
+        let first = place.first_vertex as usize;
+        &self.groups[place.group as usize].positions[first..first + place.vertex_count as usize]
+    }
+
+    /// World-space corners of a triangle. Panics when a number is out of range.
     #[inline(always)]
     pub fn corners(&self, instance: InstanceId, prim: PrimId) -> [Vec3; 3] {
         let positions = self.positions(instance);
@@ -65,27 +113,33 @@ impl World {
     }
 
     /// The scene that an instance belongs to.
-    pub fn scene(&self, _instance: InstanceId) -> &Scene {
-        unreachable!("skeleton")
+    pub fn scene(&self, instance: InstanceId) -> &Scene {
+        self.actor_scene(self.instances[instance.0 as usize].actor as usize)
     }
 
     /// The pose that an instance's actor has in this frame.
-    pub fn pose(&self, _instance: InstanceId) -> &Pose {
-        unreachable!("skeleton")
+    pub fn pose(&self, instance: InstanceId) -> &Pose {
+        self.actor_pose(self.instances[instance.0 as usize].actor as usize)
     }
 
     /// Number of actors.
     pub fn actor_count(&self) -> usize {
-        0
+        self.actors.len()
     }
 
     /// Scene of an actor.
-    pub fn actor_scene(&self, _actor: usize) -> &Scene {
-        unreachable!("skeleton")
+    pub fn actor_scene(&self, actor: usize) -> &Scene {
+        &self.actors[actor].scene
     }
 
     /// Pose of an actor in this frame.
-    pub fn actor_pose(&self, _actor: usize) -> &Pose {
-        unreachable!("skeleton")
+    pub fn actor_pose(&self, actor: usize) -> &Pose {
+        &self.actors[actor].pose
+    }
+
+    /// Lets go of every frame buffer, keeping the memory of the lists.
+    pub(crate) fn clear(&mut self) {
+        self.actors.clear();
+        self.groups.clear();
     }
 }

@@ -1,0 +1,96 @@
+use std::{sync::Arc, time::Duration};
+
+/// Why a frame could not be made.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum FrameError {
+    /// A structure could not be built.
+    #[error(transparent)]
+    Build(#[from] crate::accel::BuildError),
+    /// The background builder panicked. The loop goes on with the trees it has.
+    #[error("the background builder panicked: {0}")]
+    BuilderPanicked(String),
+    /// The background builder could not be started.
+    #[error("cannot start the background builder: {0}")]
+    BuilderStart(#[source] std::io::Error),
+    /// More than 32-bit numbers allow for.
+    #[error("{actual} {what} are placed together, at most {limit} fit")]
+    TooMany {
+        /// What there is too much of: `triangles`, `vertices` or `instances`.
+        what: &'static str,
+        /// Number placed.
+        actual: u64,
+        /// Largest number that fits.
+        limit: u64,
+    },
+}
+
+/// Wall time of the stages before tracing.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct StageTimes {
+    /// Clips to node transforms.
+    pub pose: Duration,
+    /// Pose to vertices.
+    pub deform: Duration,
+    /// Structures to the new vertices, synchronous builds and the level over groups.
+    pub refit: Duration,
+}
+
+impl StageTimes {
+    /// All stages together.
+    pub fn total(&self) -> Duration {
+        self.pose + self.deform + self.refit
+    }
+}
+
+/// What the loop did since it began.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct LoopCounts {
+    /// Frames made.
+    pub frames: u64,
+    /// Actors posed; an actor whose clips and times are those of the last frame is not.
+    pub poses: u64,
+    /// Groups whose vertices were computed; a group that no node, joint or weight moved is not.
+    pub deforms: u64,
+    /// Structures refitted, those of finished rebuilds included.
+    pub refits: u64,
+    /// Structures built before tracing: first builds, and those of a policy or structure that cannot refit.
+    pub builds: u64,
+    /// Rebuilds handed to the background builder.
+    pub rebuilds_begun: u64,
+    /// Rebuilt trees swapped in.
+    pub swaps: u64,
+    /// Rebuilt trees dropped because the triangles they were built over are gone.
+    pub rebuilds_dropped: u64,
+    /// Worst quality seen, at least 1: surface-area cost over that of the last fresh build of the same
+    /// triangles, both relative to the area of the triangles' own boxes.
+    pub quality_max: f64,
+}
+
+/// How trees are kept good.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum RebuildPolicy {
+    /// Refit only.
+    Refit,
+    /// Rebuild every frame before tracing.
+    Rebuild,
+    /// Refit every frame, rebuild in the background when quality decays.
+    #[default]
+    Async,
+    /// As `Async`, but a rebuild is begun every K frames (at least 1) and taken K frames later, whatever the
+    /// timing and the quality.
+    SwapEvery(u32),
+}
+
+/// Settings of a loop.
+#[derive(Clone, Debug)]
+pub struct FrameConfig {
+    /// Structure over triangles, as `bvh2` or `bvh2:leaf=4`.
+    pub accel: String,
+    /// Structure over groups: `bvh2` or `list`.
+    pub top: String,
+    /// How trees are kept good.
+    pub policy: RebuildPolicy,
+    /// Pool that deform, refit and synchronous builds run in.
+    pub pool: Arc<rayon::ThreadPool>,
+}

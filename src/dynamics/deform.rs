@@ -1,0 +1,22 @@
+use glam::Vec3;
+
+use super::{actor::Actor, layout::Chunk};
+use crate::anim::deform_range;
+
+/// Writes the world-space vertices of a run of chunks, in parallel in the current rayon pool.
+///
+/// No allocation; the same bits for any number of threads.
+pub(super) fn deform_chunks(chunks: &[Chunk], actors: &[Actor], out: &mut [Vec3]) {
+    match chunks {
+        [] => {}
+        [only] => {
+            let actor = &actors[only.actor];
+            deform_range(&actor.scene, &actor.pose, only.part, only.vertices.start, out);
+        }
+        _ => {
+            let (left, right) = chunks.split_at(chunks.len() / 2);
+            let (left_out, right_out) = out.split_at_mut(left.iter().map(|c| c.vertices.len()).sum());
+            rayon::join(|| deform_chunks(left, actors, left_out), || deform_chunks(right, actors, right_out));
+        }
+    }
+}

@@ -1,0 +1,211 @@
+use std::{fmt, sync::Arc, time::Instant};
+
+use glam::DAffine3;
+
+use super::{
+    FrameConfig, FrameError, LoopCounts, RebuildPolicy, StageTimes,
+    builder::{Builder, Failure, Outcome},
+    group::Group,
+    grouping::Grouping,
+    pool::Pool,
+    stage::Stage,
+};
+use crate::{
+    accel::{AccelSpec, BuildError},
+    anim::ActiveClip,
+    scene::Scene,
+    world::{TopKind, World},
+};
+
+/// Decay of a structure at which a background rebuild is begun.
+const DECAYED: f64 = 1.25;
+
+/// Rebuilds are handed to the builder until this many triangles wait there; at least one is.
+const QUEUED_TRIANGLES: usize = 1 << 16;
+
+/// Poses actors and makes one [`World`] a frame.
+///
+/// Worlds may be kept as long as anyone likes; the loop writes the next frame into other buffers. In steady
+/// state (the caller holds no more than the last world or two) a frame allocates nothing. Dropping the loop
+/// waits for the background build under way, if any.
+pub struct FrameLoop {
+    config: FrameConfig,
+    spec: Arc<AccelSpec>,
+    top: TopKind,
+    stage: Stage,
+    builder: Option<Builder>,
+    worlds: Pool<World>,
+    counts: LoopCounts,
+    #[cfg(test)]
+    pub(super) panic_in_next_rebuild: bool,
+}
+
+impl fmt::Debug for FrameLoop {
+    /// Settings and counts: the contents fill pages.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("FrameLoop").field("config", &self.config).field("counts", &self.counts).finish_non_exhaustive()
+    }
+}
+
+impl FrameLoop {
+    /// An empty loop.
+    ///
+    /// # Errors
+    /// When a structure's name or setting is unknown.
+    pub fn new(config: FrameConfig) -> Result<Self, FrameError> {
+        Self::with_grouping(config, Grouping::default())
+    }
+
+    /// [`FrameLoop::new`] with a given choice of groups, which changes no answer.
+    pub(super) fn with_grouping(config: FrameConfig, grouping: Grouping) -> Result<Self, FrameError> {
+        let spec: AccelSpec = config.accel.parse().map_err(BuildError::from)?;
+        Ok(Self {
+            spec: Arc::new(spec),
+            top: config.top.parse().map_err(BuildError::from)?,
+            config,
+            stage: Stage::new(grouping),
+            builder: None,
+            worlds: Pool::default(),
+            counts: LoopCounts { quality_max: 1.0, ..LoopCounts::default() },
+            #[cfg(test)]
+            panic_in_next_rebuild: false,
+        })
+    }
+
+    /// Adds a scene placed by `world_from_scene`; the number of the actor.
+    pub fn add(&mut self, scene: Arc<Scene>, world_from_scene: DAffine3) -> usize {
+        self.stage.add(scene, world_from_scene)
+    }
+
+    /// Puts another scene in an actor's stead, from the next frame on. Rebuilds of the old one are dropped.
+    ///
+    /// # Panics
+    /// When there is no such actor.
+    pub fn replace(&mut self, actor: usize, scene: Arc<Scene>, world_from_scene: DAffine3) {
+        self.stage.replace(actor, scene, world_from_scene);
+    }
+
+    /// Moves an actor as a whole, from the next frame on. From the first such call on none of its parts counts
+    /// as static.
+    ///
+    /// # Panics
+    /// When there is no such actor.
+    pub fn place(&mut self, actor: usize, world_from_scene: DAffine3) {
+        self.stage.place(actor, world_from_scene);
+    }
+
+    /// Poses every actor (`clips[i]` for actor i, none for the rest pose) and returns the frame's world.
+    ///
+    /// # Errors
+    /// When a build fails, the background builder panicked, or more is placed than numbers allow for. The loop
+    /// can go on after a failed rebuild; the group concerned keeps its refitted tree.
+    pub fn advance(&mut self, clips: &[&[ActiveClip]]) -> Result<(Arc<World>, StageTimes), FrameError> {
+        self.stage.settle()?;
+        self.take_rebuilds()?;
+        let pool = self.config.pool.clone();
+        let made = pool.install(|| self.make(clips))?;
+        self.begin_rebuilds()?;
+        self.counts.frames += 1;
+        Ok(made)
+    }
+
+    /// What the loop did since it began.
+    pub fn counts(&self) -> LoopCounts {
+        self.counts
+    }
+
+    /// Pose, deform, refit; in the loop's pool.
+    fn make(&mut self, clips: &[&[ActiveClip]]) -> Result<(Arc<World>, StageTimes), FrameError> {
+        let frame = self.counts.frames;
+        let mut times = StageTimes::default();
+        self.worlds.for_each_free(World::clear);
+
+        let began = Instant::now();
+        let span = tracing::info_span!("pose", frame).entered();
+        self.counts.poses += self.stage.pose(clips);
+        drop(span);
+        times.pose = began.elapsed();
+
+        let began = Instant::now();
+        let span = tracing::info_span!("deform", frame).entered();
+        self.counts.deforms += self.stage.deform();
+        drop(span);
+        times.deform = began.elapsed();
+
+        let began = Instant::now();
+        let prims = self.stage.deformed_triangles();
+        let _span = tracing::info_span!("refit", frame, accel = self.spec.kind().name(), prims).entered();
+        let work = self.stage.update(&self.spec, self.config.policy == RebuildPolicy::Rebuild)?;
+        self.counts.refits += work.refits;
+        self.counts.builds += work.builds;
+        self.counts.swaps += work.swaps;
+        self.counts.quality_max = self.counts.quality_max.max(self.stage.quality());
+        let mut world = self.worlds.take(World::default);
+        self.stage.fill(Arc::get_mut(&mut world).expect("a taken buffer has one owner"), self.top);
+        self.worlds.keep(world.clone());
+        times.refit = began.elapsed();
+        Ok((world, times))
+    }
+
+    /// Takes rebuilds that this frame boundary may see.
+    fn take_rebuilds(&mut self) -> Result<(), FrameError> {
+        let Some(builder) = &mut self.builder else { return Ok(()) };
+        let mut first_failure = None;
+        let wait = match self.config.policy {
+            RebuildPolicy::SwapEvery(every) if self.counts.frames.is_multiple_of(u64::from(every.max(1))) => true,
+            RebuildPolicy::SwapEvery(_) => return Ok(()),
+            _ => false,
+        };
+        while let Some(Outcome { epoch, result }) = if wait { builder.wait() } else { builder.poll() } {
+            let (built, failure) = match result {
+                Ok(built) => (Some(built), None),
+                Err(Failure::Build(error)) => (None, Some(FrameError::Build(error))),
+                Err(Failure::Panicked(message)) => (None, Some(FrameError::BuilderPanicked(message))),
+            };
+            match self.stage.group(epoch) {
+                Some(group) => group.end_rebuild(built),
+                None => self.counts.rebuilds_dropped += 1,
+            }
+            first_failure = first_failure.or(failure);
+        }
+        first_failure.map_or(Ok(()), Err)
+    }
+
+    /// Hands snapshots of this frame to the builder, as the policy says.
+    fn begin_rebuilds(&mut self) -> Result<(), FrameError> {
+        match self.config.policy {
+            RebuildPolicy::Refit | RebuildPolicy::Rebuild => Ok(()),
+            RebuildPolicy::SwapEvery(every) => {
+                if self.counts.frames.is_multiple_of(u64::from(every.max(1))) {
+                    while let Some(number) = self.stage.groups.iter().position(Group::wants_rebuild) {
+                        self.begin(number)?;
+                    }
+                }
+                Ok(())
+            }
+            RebuildPolicy::Async => {
+                while self.stage.rebuilding_triangles() < QUEUED_TRIANGLES {
+                    let Some(number) = self.stage.most_decayed(DECAYED) else { break };
+                    self.begin(number)?;
+                }
+                Ok(())
+            }
+        }
+    }
+
+    fn begin(&mut self, number: usize) -> Result<(), FrameError> {
+        if self.builder.is_none() {
+            self.builder = Some(Builder::start(self.spec.clone()).map_err(FrameError::BuilderStart)?);
+        }
+        let builder = self.builder.as_mut().expect("started above");
+        #[cfg_attr(not(test), expect(unused_mut, reason = "tests change it"))]
+        let mut job = self.stage.groups[number].begin_rebuild(self.counts.frames);
+        #[cfg(test)]
+        {
+            job.panic = std::mem::take(&mut self.panic_in_next_rebuild);
+        }
+        builder.send(job);
+        self.counts.rebuilds_begun += 1;
+        Ok(())
+    }
+}

@@ -1,0 +1,247 @@
+use std::{collections::HashMap, sync::Arc};
+
+use glam::DAffine3;
+use rayon::prelude::*;
+
+use super::{
+    FrameError,
+    actor::Actor,
+    group::{Group, MemberKey, Work},
+    grouping::{ActorParts, GroupPlan, Grouping, plan},
+    layout::{Member, Shape, check, lay_out},
+};
+use crate::{
+    accel::AccelSpec,
+    anim::ActiveClip,
+    geom::InstanceId,
+    scene::Scene,
+    world::{ActorFrame, Place, TopKind, World, WorldInstance},
+};
+
+/// The actors and the groups that their parts form.
+#[derive(Debug)]
+pub(super) struct Stage {
+    actors: Vec<Actor>,
+    /// Changes when an actor's scene or what of it is static does.
+    generations: Vec<u64>,
+    next_generation: u64,
+    pub(super) groups: Vec<Group>,
+    next_epoch: u64,
+    instances: Arc<[WorldInstance]>,
+    places: Arc<[Place]>,
+    /// The groups are those of the actors.
+    settled: bool,
+    grouping: Grouping,
+}
+
+impl Stage {
+    pub(super) fn new(grouping: Grouping) -> Self {
+        Self {
+            actors: Vec::new(),
+            generations: Vec::new(),
+            next_generation: 0,
+            groups: Vec::new(),
+            next_epoch: 1,
+            instances: Arc::default(),
+            places: Arc::default(),
+            settled: false,
+            grouping,
+        }
+    }
+
+    pub(super) fn add(&mut self, scene: Arc<Scene>, world_from_scene: DAffine3) -> usize {
+        let number = self.actors.len();
+        self.actors.push(Actor::new(scene, world_from_scene));
+        self.generations.push(0);
+        self.renew(number);
+        number
+    }
+
+    pub(super) fn replace(&mut self, actor: usize, scene: Arc<Scene>, world_from_scene: DAffine3) {
+        self.actors[actor] = Actor::new(scene, world_from_scene);
+        self.renew(actor);
+    }
+
+    pub(super) fn place(&mut self, actor: usize, world_from_scene: DAffine3) {
+        if self.actors[actor].place(world_from_scene) {
+            self.renew(actor);
+        }
+    }
+
+    fn renew(&mut self, actor: usize) {
+        self.generations[actor] = self.next_generation;
+        self.next_generation += 1;
+        self.settled = false;
+    }
+
+    /// Forms the groups anew when actors have changed; groups whose parts are the same stay as they are.
+    pub(super) fn settle(&mut self) -> Result<(), FrameError> {
+        if self.settled {
+            return Ok(());
+        }
+        let total: u64 = self.actors.iter().map(|a| a.scene.instances.len() as u64).sum();
+        check("instances", total, u64::from(u32::MAX))?;
+        let instances = self.number_instances();
+        let plans = plan(&self.actor_parts(), self.grouping);
+        let mut old: HashMap<Vec<MemberKey>, Group> =
+            std::mem::take(&mut self.groups).into_iter().map(|group| (group.key.clone(), group)).collect();
+        let mut places = vec![Place { group: 0, first_vertex: 0, vertex_count: 0 }; instances.len()];
+        let firsts = self.first_instances();
+        for (number, plan) in (0..).zip(&plans) {
+            let member = |id: InstanceId| {
+                let WorldInstance { actor, part } = instances[id.0 as usize];
+                Member { id, actor: actor as usize, scene: &self.actors[actor as usize].scene, part }
+            };
+            let key = self.key(plan, &firsts, &instances);
+            let group = match old.remove(&key) {
+                Some(mut group) => {
+                    group.shape.renumber(&plan.members);
+                    group
+                }
+                None => {
+                    self.next_epoch += 1;
+                    Group::new(lay_out(plan, self.next_epoch, member)?, key, plan.actor)
+                }
+            };
+            group.shape.note_places(number, member, &mut places);
+            self.groups.push(group);
+        }
+        self.instances = instances.into();
+        self.places = places.into();
+        self.settled = true;
+        Ok(())
+    }
+
+    #[expect(clippy::cast_possible_truncation, reason = "there are at most as many actors as fit in memory")]
+    fn number_instances(&self) -> Vec<WorldInstance> {
+        let actors = self.actors.iter().enumerate();
+        actors
+            .flat_map(|(n, a)| a.scene.instances.iter().map(move |&part| WorldInstance { actor: n as u32, part }))
+            .collect()
+    }
+
+    /// The world's number of each actor's first instance; the total was checked.
+    #[expect(clippy::cast_possible_truncation, reason = "the total fits in 32 bits")]
+    fn first_instances(&self) -> Vec<u32> {
+        let counts = self.actors.iter().map(|a| a.scene.instances.len() as u32);
+        counts.scan(0, |next, count| Some(std::mem::replace(next, *next + count))).collect()
+    }
+
+    fn actor_parts(&self) -> Vec<ActorParts<'_>> {
+        let actors = self.actors.iter().zip(self.first_instances());
+        actors
+            .map(|(actor, first_instance)| ActorParts { scene: &actor.scene, classes: &actor.classes, first_instance })
+            .collect()
+    }
+
+    fn key(&self, plan: &GroupPlan, firsts: &[u32], instances: &[WorldInstance]) -> Vec<MemberKey> {
+        let member = |id: &InstanceId| {
+            let actor = instances[id.0 as usize].actor as usize;
+            MemberKey { actor, generation: self.generations[actor], instance: id.0 - firsts[actor] }
+        };
+        plan.members.iter().map(member).collect()
+    }
+
+    /// Poses every actor whose clips changed; their number.
+    pub(super) fn pose(&mut self, clips: &[&[ActiveClip]]) -> u64 {
+        let pose =
+            |(number, actor): (usize, &mut Actor)| u64::from(actor.pose(clips.get(number).copied().unwrap_or(&[])));
+        match &mut self.actors[..] {
+            [only] => pose((0, only)),
+            actors => actors.par_iter_mut().enumerate().map(pose).sum(),
+        }
+    }
+
+    /// Computes the vertices of every group that moved; the number of groups.
+    pub(super) fn deform(&mut self) -> u64 {
+        let actors = &self.actors;
+        match &mut self.groups[..] {
+            [only] => only.deform(actors),
+            groups => groups.par_iter_mut().for_each(|group| group.deform(actors)),
+        }
+        self.groups.iter().map(|group| u64::from(group.deformed())).sum()
+    }
+
+    /// Triangles of the groups that moved.
+    pub(super) fn deformed_triangles(&self) -> usize {
+        self.groups.iter().filter(|group| group.deformed()).map(Group::triangle_count).sum()
+    }
+
+    /// Brings every structure to its group's vertices.
+    pub(super) fn update(&mut self, spec: &AccelSpec, rebuild_always: bool) -> Result<Work, FrameError> {
+        match &mut self.groups[..] {
+            [only] => only.update(spec, rebuild_always),
+            groups => groups.par_iter_mut().for_each(|group| group.update(spec, rebuild_always)),
+        }
+        let mut sum = Work::default();
+        for group in &mut self.groups {
+            let work = std::mem::replace(&mut group.outcome, Ok(Work::default()))?;
+            sum.refits += work.refits;
+            sum.builds += work.builds;
+            sum.swaps += work.swaps;
+        }
+        Ok(sum)
+    }
+
+    /// The worst decay of any group.
+    pub(super) fn quality(&self) -> f64 {
+        self.groups.iter().map(Group::quality).fold(1.0, f64::max)
+    }
+
+    /// The group with the worst decay above `limit` that can be rebuilt, the earliest of equals.
+    pub(super) fn most_decayed(&self, limit: f64) -> Option<usize> {
+        let mut worst = (limit, None);
+        for (number, group) in self.groups.iter().enumerate() {
+            if group.quality() > worst.0 && group.wants_rebuild() {
+                worst = (group.quality(), Some(number));
+            }
+        }
+        worst.1
+    }
+
+    /// Triangles of the groups that are being rebuilt.
+    pub(super) fn rebuilding_triangles(&self) -> usize {
+        self.groups.iter().filter(|group| group.is_rebuilding()).map(Group::triangle_count).sum()
+    }
+
+    /// The group with this topology epoch.
+    pub(super) fn group(&mut self, epoch: u64) -> Option<&mut Group> {
+        self.groups.iter_mut().find(|group| group.shape.layout.topology_epoch == epoch)
+    }
+
+    /// Makes `world` this frame's; it must have been cleared.
+    pub(super) fn fill(&mut self, world: &mut World, top: TopKind) {
+        if !Arc::ptr_eq(&world.instances, &self.instances) {
+            world.instances = self.instances.clone();
+            world.places = self.places.clone();
+        }
+        let frames = |actor: &Actor| ActorFrame { scene: actor.scene.clone(), pose: actor.pose.clone() };
+        world.actors.extend(self.actors.iter().map(frames));
+        world.groups.extend(self.groups.iter().filter_map(Group::frame));
+        world.top.rebuild(top, &world.groups);
+        for actor in &mut self.actors {
+            actor.previous = None;
+        }
+    }
+}
+
+impl Shape {
+    /// Gives the members other numbers in the world.
+    fn renumber(&mut self, members: &[InstanceId]) {
+        if self.layout.instances != members {
+            let layout = Arc::make_mut(&mut self.layout);
+            layout.instances.clear();
+            layout.instances.extend_from_slice(members);
+        }
+    }
+
+    /// Notes where the members' vertices lie.
+    fn note_places<'a>(&self, group: u32, member: impl Fn(InstanceId) -> Member<'a>, places: &mut [Place]) {
+        let mut first_vertex = 0;
+        for &id in &self.layout.instances {
+            let vertex_count = member(id).vertex_count();
+            places[id.0 as usize] = Place { group, first_vertex, vertex_count };
+            first_vertex += vertex_count;
+        }
+    }
+}

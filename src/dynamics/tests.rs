@@ -1,0 +1,81 @@
+//! Tests that reach into the loop: other groupings, a builder that panics.
+
+use std::sync::Arc;
+
+use glam::{DAffine3, DVec3};
+
+use super::{FrameConfig, FrameError, FrameLoop, RebuildPolicy, grouping::Grouping};
+use crate::{
+    anim::ActiveClip,
+    geom::{Hit, Ray},
+    scene::{ClipId, Scene},
+    simd::Scalar,
+    world::World,
+};
+
+#[path = "../../tests/common/scenes.rs"]
+#[allow(dead_code, reason = "shared with the integration tests, which use the rest")]
+#[allow(unreachable_pub, clippy::pedantic, missing_docs, reason = "a test file")]
+mod scenes;
+
+use scenes::{Random, bodies, burst, figure, still};
+
+fn config(accel: &str, policy: RebuildPolicy) -> FrameConfig {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().unwrap();
+    FrameConfig { accel: accel.into(), top: "bvh2".into(), policy, pool: Arc::new(pool) }
+}
+
+fn at(time_s: f64) -> [ActiveClip; 1] {
+    [ActiveClip { clip: ClipId(0), time_s }]
+}
+
+fn hits(world: &World) -> Vec<Option<Hit>> {
+    let mut random = Random::new(77);
+    (0..400)
+        .map(|_| {
+            let ray = Ray::new(random.vec() * 5.0, random.vec());
+            world.closest_hit::<Scalar, _>(&ray, &|_| true)
+        })
+        .collect()
+}
+
+fn crowd(grouping: Grouping) -> FrameLoop {
+    let mut frames = FrameLoop::with_grouping(config("list", RebuildPolicy::Refit), grouping).unwrap();
+    let scenes: [Scene; 4] = [figure(30), bodies(12), still(), burst(100)];
+    for (i, scene) in (0_u8..).zip(scenes) {
+        frames.add(Arc::new(scene), DAffine3::from_translation(DVec3::new(f64::from(i) - 1.5, 0.0, 0.0)));
+    }
+    frames
+}
+
+#[test]
+fn grouping_changes_no_hit() {
+    let mut loops = [Grouping::ByMotion, Grouping::Single, Grouping::ByActor].map(crowd);
+    for time_s in [0.0, 0.7, 1.9, 0.7] {
+        let clip = at(time_s);
+        let clips: [&[ActiveClip]; 4] = [&clip, &clip, &[], &clip];
+        let [by_motion, single, by_actor] = loops.each_mut().map(|l| l.advance(&clips).unwrap().0);
+        assert_eq!(single.group_count(), single.instances().len());
+        assert_eq!(by_actor.group_count(), 4);
+        assert!(by_motion.group_count() < single.group_count());
+        let expected = hits(&by_motion);
+        assert!(expected.iter().flatten().count() > 20, "rays must hit something");
+        assert!(hits(&single) == expected, "single at {time_s}");
+        assert!(hits(&by_actor) == expected, "by actor at {time_s}");
+        assert_eq!(by_motion.bounds(), single.bounds());
+    }
+}
+
+#[test]
+fn a_panic_of_the_builder_is_an_error_of_one_frame() {
+    let mut frames = FrameLoop::new(config("list", RebuildPolicy::SwapEvery(1))).unwrap();
+    frames.add(Arc::new(burst(50)), DAffine3::IDENTITY);
+    frames.advance(&[&at(0.0)]).unwrap();
+    frames.panic_in_next_rebuild = true;
+    frames.advance(&[&at(0.1)]).unwrap();
+    let error = frames.advance(&[&at(0.2)]).unwrap_err();
+    assert!(matches!(&error, FrameError::BuilderPanicked(m) if m.contains("asked to panic")), "{error}");
+    let (world, _) = frames.advance(&[&at(0.2)]).unwrap();
+    assert_eq!(world.triangle_count(), 50);
+    assert_eq!(frames.counts().swaps, 0);
+}
