@@ -14,6 +14,8 @@ mod grouping;
 mod layout;
 mod pool;
 mod stage;
+#[cfg(test)]
+mod tests;
 
 pub use config::{FrameConfig, FrameError, LoopCounts, RebuildPolicy, StageTimes};
 pub use frame_loop::FrameLoop;
