@@ -125,18 +125,23 @@ impl Task for Deform<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self) {
-        let mut block = [[0.0; 3]; BLOCK];
+        let mut rest = [[0.0; 3]; BLOCK];
+        let mut world = [[0.0; 4]; BLOCK];
         for (k, out) in self.out.chunks_mut(BLOCK).enumerate() {
             let first = self.first + k * BLOCK;
-            let block = &mut block[..out.len()];
-            morph(self.part, self.weights, first, block);
+            let rest = &mut rest[..out.len()];
+            let world = &mut world[..out.len()];
+            morph(self.part, self.weights, first, rest);
             match self.placement {
-                Placement::Whole(matrix) => place(&JointColumns::from(&matrix), block, out),
+                Placement::Whole(matrix) => place(&JointColumns::from(&matrix), rest, world),
                 Placement::Skinned { influences, palette } => match influences.per_vertex {
-                    4 => skin::<4>(influences, palette, first, block, out),
-                    8 => skin::<8>(influences, palette, first, block, out),
-                    _ => skin_any(influences, palette, first, block, out),
+                    4 => skin::<4>(influences, palette, first, rest, world),
+                    8 => skin::<8>(influences, palette, first, rest, world),
+                    _ => skin_any(influences, palette, first, rest, world),
                 },
+            }
+            for (out, v) in out.iter_mut().zip(world) {
+                *out = rounded(v);
             }
         }
     }
@@ -164,64 +169,79 @@ fn morph(part: &MeshPart, weights: &[f64], first: usize, block: &mut [[f64; 3]])
 
 /// One matrix for all vertices of the block.
 #[inline(always)]
-fn place(matrix: &JointColumns, block: &[[f64; 3]], out: &mut [Vec3]) {
-    for (p, out) in block.iter().zip(out) {
-        *out = rounded(&transformed(&matrix.0, p));
+fn place(matrix: &JointColumns, rest: &[[f64; 3]], world: &mut [[f64; 4]]) {
+    for (p, out) in rest.iter().zip(world) {
+        *out = transformed(&matrix.0, p);
     }
 }
 
 /// A blend of N joint matrices a vertex.
+///
+/// Written as whole-array expressions: the vectoriser makes four-wide code of these, which it does not of the
+/// same sums in nested loops (measured: 7 against 13 ns a vertex with AVX2).
 #[inline(always)]
 fn skin<const N: usize>(
     influences: &Influences,
     palette: &[JointColumns],
     first: usize,
-    block: &[[f64; 3]],
-    out: &mut [Vec3],
+    rest: &[[f64; 3]],
+    world: &mut [[f64; 4]],
 ) {
     let joints = influences.joints[first * N..].as_chunks::<N>().0;
     let weights = influences.weights[first * N..].as_chunks::<N>().0;
-    for (((p, out), joints), weights) in block.iter().zip(out).zip(joints).zip(weights) {
-        *out = skinned(joints, weights, palette, p);
+    for (((p, out), joints), weights) in rest.iter().zip(world).zip(joints).zip(weights) {
+        let mut weights = weights.map(f64::from);
+        let mut sum = weights.iter().fold(0.0, |sum, w| sum + w);
+        if sum == 0.0 {
+            weights = std::array::from_fn(|k| if k == 0 { 1.0 } else { 0.0 });
+            sum = 1.0;
+        }
+        let joints: [&[[f64; 4]; 4]; N] = std::array::from_fn(|k| &palette[usize::from(joints[k])].0);
+        let column = |a: usize| {
+            let mut blend: [f64; 4] = std::array::from_fn(|i| weights[0] * joints[0][a][i]);
+            for k in 1..N {
+                blend = std::array::from_fn(|i| blend[i] + weights[k] * joints[k][a][i]);
+            }
+            blend
+        };
+        let inv = 1.0 / sum;
+        let placed = transformed(&[column(0), column(1), column(2), column(3)], p);
+        *out = std::array::from_fn(|i| placed[i] * inv);
     }
 }
 
 /// [`skin`] for any number of influences.
 #[inline(always)]
-fn skin_any(influences: &Influences, palette: &[JointColumns], first: usize, block: &[[f64; 3]], out: &mut [Vec3]) {
+fn skin_any(
+    influences: &Influences,
+    palette: &[JointColumns],
+    first: usize,
+    rest: &[[f64; 3]],
+    world: &mut [[f64; 4]],
+) {
     let n = influences.per_vertex;
     let joints = influences.joints[first * n..].chunks_exact(n);
     let weights = influences.weights[first * n..].chunks_exact(n);
-    for (((p, out), joints), weights) in block.iter().zip(out).zip(joints).zip(weights) {
-        *out = skinned(joints, weights, palette, p);
+    for (((p, out), joints), weights) in rest.iter().zip(world).zip(joints).zip(weights) {
+        let (columns, sum) = blended(joints, weights, palette);
+        let inv = 1.0 / sum;
+        *out = transformed(&columns, p).map(|v| v * inv);
     }
 }
 
-/// One vertex by the blend of its joints' matrices.
-#[inline(always)]
-fn skinned(joints: &[u16], weights: &[f32], palette: &[JointColumns], p: &[f64; 3]) -> Vec3 {
-    let (mut blend, sum) = blended(joints, weights, palette);
-    if sum == 0.0 {
-        blend = palette[usize::from(joints[0])].0;
-        return rounded(&transformed(&blend, p));
-    }
-    let scale = 1.0 / sum;
-    rounded(&transformed(&blend, p).map(|v| v * scale))
-}
-
-/// The weighted sum of joint matrices, not divided, and the sum of the weights.
+/// The weighted sum of joint matrices, not divided, and the sum of the weights; the first joint's matrix and 1
+/// when that sum is zero.
 #[inline(always)]
 pub(super) fn blended(joints: &[u16], weights: &[f32], palette: &[JointColumns]) -> ([[f64; 4]; 4], f64) {
+    let sum = weights.iter().fold(0.0, |sum, &w| sum + f64::from(w));
+    if sum == 0.0 {
+        return (palette[usize::from(joints[0])].0, 1.0);
+    }
     let mut blend = [[0.0; 4]; 4];
-    let mut sum = 0.0;
     for (&joint, &weight) in joints.iter().zip(weights) {
         let weight = f64::from(weight);
-        sum += weight;
-        let columns = &palette[usize::from(joint)].0;
-        for (b, c) in blend.iter_mut().zip(columns) {
-            for (b, c) in b.iter_mut().zip(c) {
-                *b += weight * c;
-            }
+        for (b, c) in blend.as_flattened_mut().iter_mut().zip(palette[usize::from(joint)].0.as_flattened()) {
+            *b += weight * c;
         }
     }
     (blend, sum)

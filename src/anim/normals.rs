@@ -55,11 +55,7 @@ fn vertex_matrix(scene: &Scene, pose: &Pose, instance: PartInstance, vertex: usi
         Placement::Skinned { influences, palette } => (influences, palette),
     };
     let range = vertex * influences.per_vertex..(vertex + 1) * influences.per_vertex;
-    let joints = &influences.joints[range.clone()];
-    let (mut columns, sum) = blended(joints, &influences.weights[range], palette);
-    if sum == 0.0 {
-        columns = palette[usize::from(joints[0])].0;
-    }
+    let (columns, sum) = blended(&influences.joints[range.clone()], &influences.weights[range], palette);
     let side = if sum < 0.0 { -1.0 } else { 1.0 };
     let column = |c: &[f64; 4]| DVec3::new(c[0], c[1], c[2]) * side;
     let [x, y, z, t] = &columns;
