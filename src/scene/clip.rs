@@ -27,7 +27,7 @@ pub struct Channel {
 }
 
 /// What a channel drives.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum ChannelTarget {
     /// A node's translation.
     Translation(NodeId),
