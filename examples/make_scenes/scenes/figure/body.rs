@@ -37,6 +37,7 @@ impl Group {
         let union = self.solids.iter().fold(f64::INFINITY, |d, (solid, blend)| blended(d, solid.distance(p), *blend));
         match self.stuff {
             Stuff::Hair => smooth_max(union, hairline(p), 0.02),
+            Stuff::Trousers => smooth_max(union, 0.098 - p.y, 0.010),
             Stuff::Shoe => smooth_max(union, 0.002 - p.y, 0.012),
             _ => union,
         }
@@ -90,7 +91,7 @@ impl Body {
             // The two parts of a garment run into each other; different garments meet in a seam.
             let k = match group.stuff {
                 Stuff::Hoodie => 0.045,
-                Stuff::Trousers => 0.03,
+                Stuff::Trousers => 0.022,
                 _ => SEAM,
             };
             best = blended(best, group.distance(p), k);
@@ -156,8 +157,8 @@ fn torso() -> Vec<(Solid, f64)> {
         (Solid::cone(v(-0.12, 1.215, -0.005), v(0.12, 1.215, -0.005), 0.062, 0.062), 0.04),
         // The hood lies on the shoulders; its rim runs round the neck.
         (Solid::ellipsoid(v(0.0, 1.262, -0.088), v(0.098, 0.060, 0.055)), 0.03),
-        (Solid::cone(v(0.058, 1.283, -0.050), v(0.030, 1.250, 0.068), 0.028, 0.019), 0.015),
-        (Solid::cone(v(-0.058, 1.283, -0.050), v(-0.030, 1.250, 0.068), 0.028, 0.019), 0.015),
+        (Solid::cone(v(0.060, 1.283, -0.050), v(0.012, 1.238, 0.076), 0.028, 0.014), 0.02),
+        (Solid::cone(v(-0.060, 1.283, -0.050), v(-0.012, 1.238, 0.076), 0.028, 0.014), 0.02),
     ]
 }
 
@@ -195,10 +196,10 @@ fn leg() -> Vec<(Solid, f64)> {
     let (hip, knee, ankle) = (Joint::ThighL.position(), Joint::ShinL.position(), Joint::FootL.position());
     let cuff = ankle + v(0.0, 0.045, -0.002);
     vec![
-        (Solid::cone(hip, knee, 0.091, 0.066), 0.0),
+        (Solid::cone(hip, knee, 0.087, 0.064), 0.0),
         (Solid::cone(knee, cuff, 0.066, 0.058), 0.03),
         (Solid::cone(cuff - v(0.0, 0.012, 0.0), cuff + v(0.0, 0.012, 0.0), 0.060, 0.062), 0.006),
-        (Solid::ellipsoid(v(0.03, 0.862, -0.006), v(0.112, 0.085, 0.108)), 0.05),
+        (Solid::ellipsoid(v(0.03, 0.868, -0.006), v(0.114, 0.080, 0.108)), 0.05),
         (Solid::ellipsoid(v(0.062, 0.835, -0.042), v(0.074, 0.074, 0.074)), 0.03),
     ]
 }

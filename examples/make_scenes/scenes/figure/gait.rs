@@ -158,25 +158,9 @@ fn arm(at: &mut Stance, phase: f64, side: f64, clavicle: Joint) {
     let forward = |angle: f64, inward: f64| about(DVec3::Y, side * -inward) * about(DVec3::X, -angle);
     let shoulder = deg(mix(2.0, 25.0, 0.5 + 0.5 * swing) + mix(-23.0, 0.0, 0.5 + 0.5 * swing));
     let elbow = deg(30.0 + 13.0 * lag);
-    at.world[upper] = forward(shoulder, deg(4.0)) * lower;
-    at.world[forearm] = forward(shoulder + elbow, deg(14.0 + 6.0 * lag)) * lower;
+    at.world[upper] = forward(shoulder, deg(-2.0)) * lower;
+    at.world[forearm] = forward(shoulder + elbow, deg(3.0 + 5.0 * lag)) * lower;
     at.world[hand] =
-        forward(shoulder + elbow + deg(4.0), deg(16.0 + 6.0 * lag)) * lower * euler(0.0, 0.0, side * deg(-4.0));
+        forward(shoulder + elbow + deg(4.0), deg(4.0 + 5.0 * lag)) * lower * euler(0.0, 0.0, side * deg(-4.0));
     at.world[fingers] = at.world[hand] * about(DVec3::Z, side * deg(-24.0 - 5.0 * lag));
-}
-
-/// Where each joint is, and its world rotation, in `posture`.
-pub fn world_joints(posture: &Posture) -> [(DVec3, DQuat); JOINTS.len()] {
-    let mut out = [(DVec3::ZERO, DQuat::IDENTITY); JOINTS.len()];
-    for joint in JOINTS {
-        let local = posture.rotations[joint as usize];
-        out[joint as usize] = match joint.parent() {
-            None => (posture.hips, local),
-            Some(parent) => {
-                let (place, turn) = out[parent as usize];
-                (place + turn * (joint.position() - parent.position()), turn * local)
-            }
-        };
-    }
-    out
 }

@@ -4,6 +4,8 @@ mod body;
 mod gait;
 mod paint;
 mod rig;
+mod skin_mesh;
+mod stage;
 mod weights;
 
 use glam::{DQuat, DVec3};
@@ -12,7 +14,6 @@ use super::{
     glb::{Animation, Glb, Keys, Node},
     maths::deg,
     nets::{self, Surface},
-    sdf,
 };
 use body::Body;
 use rig::JOINTS;
@@ -29,20 +30,22 @@ pub fn walk(detail: f64) -> Vec<u8> {
     let mut animation = Animation::default();
     let joints = rig_nodes(&mut glb);
     animate(&mut glb, &mut animation, &joints);
-    let mesh = skin_mesh(&mut glb, &body, &surface);
+    let mesh = skin_mesh::add(&mut glb, &body, &surface);
     let binds: Vec<DVec3> = JOINTS.iter().map(|j| -j.position()).collect();
     let binds = glb.translation_matrices(&binds);
     let skin = Some(glb.skin("figure", &joints, binds));
     let figure = glb.node(Node { name: "figure".into(), mesh: Some(mesh), skin, ..Node::default() });
     let camera = glb.camera("three-quarter", DVec3::new(1.75, 1.30, 2.85), DVec3::new(0.0, 0.80, 0.0), deg(31.0));
+    let mut roots = vec![joints[0], figure, camera];
+    roots.extend(stage::add(&mut glb, &mut animation, CYCLES as f64 * gait::CYCLE));
     glb.animation("walk", &animation);
-    glb.finish(&[joints[0], figure, camera])
+    glb.finish(&roots)
 }
 
 /// The figure's surface as an even mesh, finer at hands and head.
 fn sculpt(body: &Body, detail: f64) -> Surface {
     let field = |p: DVec3| body.distance(p);
-    let base = 0.0195 / detail;
+    let base = 0.0210 / detail;
     let x = |x: f64| if x.abs() > 0.40 { 0.72 * base } else { base };
     let y = |y: f64| if y > 1.36 || y < 0.12 { 0.85 * base } else { 1.12 * base };
     let axes = [
@@ -82,24 +85,4 @@ fn animate(glb: &mut Glb, animation: &mut Animation, joints: &[usize]) {
         let sampler = animation.sampler(Keys::Linear, input, output);
         animation.channel(sampler, joints[joint as usize], "rotation");
     }
-}
-
-fn skin_mesh(glb: &mut Glb, body: &Body, surface: &Surface) -> usize {
-    let field = |p: DVec3| body.distance(p);
-    let normals: Vec<DVec3> = surface.positions.iter().map(|&p| sdf::normal(&field, p, 2e-3)).collect();
-    let influences = weights::bind(surface);
-    let joints: Vec<[u8; 4]> = influences.iter().map(|i| i.joints).collect();
-    let weights: Vec<[f64; 4]> = influences.iter().map(|i| i.weights).collect();
-    let colors: Vec<[f64; 4]> = surface.positions.iter().map(|&p| paint::linear(paint::color(body, p))).collect();
-    let attributes = [
-        ("POSITION", glb.positions(&surface.positions)),
-        ("NORMAL", glb.vectors(&normals)),
-        ("COLOR_0", glb.quads(&colors)),
-        ("JOINTS_0", glb.bytes4(&joints, false)),
-        ("WEIGHTS_0", glb.quads(&weights)),
-    ];
-    let indices = glb.triangles(&surface.triangles);
-    let material =
-        glb.material("\"name\":\"figure\",\"pbrMetallicRoughness\":{\"metallicFactor\":0,\"roughnessFactor\":0.75}");
-    glb.mesh("figure", &attributes, indices, material)
 }

@@ -58,7 +58,7 @@ pub const HEEL: DVec3 = DVec3::new(0.0, -ANKLE_HEIGHT, -0.05);
 pub const BALL: DVec3 = DVec3::new(0.0, -ANKLE_HEIGHT, 0.108);
 
 const SHOULDER: DVec3 = DVec3::new(0.15, 1.222, -0.005);
-const HIP_JOINT: DVec3 = DVec3::new(0.082, 0.82, 0.0);
+const HIP_JOINT: DVec3 = DVec3::new(0.090, 0.82, 0.0);
 
 impl Joint {
     /// The joint above it; `None` for the hips.

@@ -15,8 +15,8 @@ pub struct Influence {
 }
 
 /// Width over which neighbouring bones share the surface, in metres.
-const SHARE: f64 = 0.012;
-const SMOOTHING_ROUNDS: usize = 10;
+const SHARE: f64 = 0.016;
+const SMOOTHING_ROUNDS: usize = 12;
 
 /// Weights of every vertex of the figure's surface.
 pub fn bind(surface: &Surface) -> Vec<Influence> {
