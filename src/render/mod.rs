@@ -1,12 +1,32 @@
 //! Camera rays, shading, film. Reads a finished world; never builds one.
 
-use crate::{simd::SimdLevel, world::World};
-
+mod brdf;
 mod camera;
+mod context;
+mod exposure;
 mod film;
+mod filter;
+mod lights;
+mod material;
+mod math;
+mod pattern;
+mod plain;
+mod prepared;
+mod rays;
+mod renderer;
+mod shade;
+mod sky;
+mod surface;
+mod texture;
+mod tile;
+mod tone;
+mod vertex_cache;
 
 pub use camera::CameraView;
 pub use film::Film;
+pub use renderer::Renderer;
+
+use crate::simd::SimdLevel;
 
 /// What a pixel shows.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -22,6 +42,27 @@ pub enum Shading {
     /// Materials, lights, shadows, sky.
     #[default]
     Direct,
+}
+
+impl Shading {
+    /// Every shading, in the order in which a viewer offers them.
+    pub const ALL: [Self; 5] = [Self::Direct, Self::Eyelight, Self::Normals, Self::Depth, Self::Ao];
+
+    /// The name on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Eyelight => "eyelight",
+            Self::Normals => "normals",
+            Self::Depth => "depth",
+            Self::Ao => "ao",
+            Self::Direct => "direct",
+        }
+    }
+
+    /// True when materials and lights count, so that colours are scene-referred.
+    pub(crate) fn is_lit(self) -> bool {
+        self == Self::Direct
+    }
 }
 
 /// Settings that decide a frame's pixels.
@@ -48,10 +89,4 @@ impl Default for RenderSettings {
     fn default() -> Self {
         Self { shading: Shading::Direct, samples: 1, first_sample: 0, seed: 0, frame: 0, simd: SimdLevel::best() }
     }
-}
-
-/// Renders `world` seen by `camera` into `film` (whose size decides the picture's), in parallel over tiles in
-/// the current rayon pool. Returns the number of rays traced.
-pub fn render(_world: &World, _camera: &CameraView, _settings: &RenderSettings, _film: &mut Film) -> u64 {
-    0
 }

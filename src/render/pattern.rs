@@ -57,6 +57,12 @@ impl PixelSampler {
         Self { key: scene ^ (u64::from(pixel) << 20), sample }
     }
 
+    /// Number of the sample in the pixel's pattern.
+    #[inline(always)]
+    pub(crate) fn index(&self) -> u32 {
+        self.sample
+    }
+
     /// Point `index` of `count` on the unit square for `purpose`; the samples of a pixel together continue one
     /// evenly spread sequence.
     #[inline(always)]

@@ -59,6 +59,16 @@ fn decode(s: f64) -> f64 {
     if s <= 0.04045 { s / 12.92 } else { libm::pow((s + 0.055) / 1.055, 2.4) }
 }
 
+/// [`decode`] of any value in [0, 1], by the line between its two neighbours of the 256 values.
+#[inline(always)]
+pub(crate) fn linear_of(encoded: f32) -> f32 {
+    let table = linear_from_srgb8();
+    let x = encoded.clamp(0.0, 1.0) * 255.0;
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at most 254")]
+    let low = (x as usize).min(254);
+    table[low] + (table[low + 1] - table[low]) * (x - low as f32)
+}
+
 /// Exponent and mantissa bits above which buckets of [`Srgb8`] begin: 2^-13, below the first threshold.
 const FIRST_BUCKET: u32 = (127 - 13) << 7;
 /// Buckets up to 1.0, 128 an octave.

@@ -132,6 +132,11 @@ impl World {
         &self.actors[actor].scene
     }
 
+    /// Scene of an actor, to be shared.
+    pub fn shared_scene(&self, actor: usize) -> &Arc<Scene> {
+        &self.actors[actor].scene
+    }
+
     /// Pose of an actor in this frame.
     pub fn actor_pose(&self, actor: usize) -> &Pose {
         &self.actors[actor].pose
