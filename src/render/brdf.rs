@@ -1,5 +1,7 @@
 //! The metallic-roughness reflection model: GGX with height-correlated Smith shadowing and Schlick's Fresnel
-//! term, made energy-conserving by a table of its directional albedo.
+//! term, made energy-conserving by a table of its directional albedo: light scattered between microfacets is added, and what
+//! the specular layer reflects is missing below it (by its albedo at the view's angle, where the specification's simple
+//! mix takes the Fresnel term of the half vector and gains a quarter at grazing angles).
 //!
 //! # Source
 //! glTF 2.0 specification, appendix B; Heitz, "Understanding the Masking-Shadowing Function", 2014; Karis, "Real
@@ -34,8 +36,10 @@ pub(crate) struct Reflectance {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct View {
     cos: f32,
-    /// Scale and bias of `f0` in the directional albedo of single scattering.
-    split: [f32; 2],
+    /// Directional albedo of the specular layer.
+    specular: Vec3,
+    /// Albedo of what lies below it.
+    diffuse: Vec3,
     /// Gain that makes up for scattering between microfacets.
     gain: Vec3,
 }
@@ -46,7 +50,12 @@ impl Reflectance {
     pub(crate) fn new(base: Vec3, metallic: f32, roughness: f32) -> Self {
         let roughness = roughness.clamp(LEAST_ROUGHNESS, 1.0);
         let f0 = Vec3::splat(0.04);
-        Self { diffuse: base * (1.0 - metallic), f0: f0 + (base - f0) * metallic, alpha: roughness * roughness, roughness }
+        Self {
+            diffuse: base * (1.0 - metallic),
+            f0: f0 + (base - f0) * metallic,
+            alpha: roughness * roughness,
+            roughness,
+        }
     }
 
     /// The part that depends on the view alone; `cos` between view and shading normal, positive.
@@ -54,7 +63,9 @@ impl Reflectance {
     pub(crate) fn view(&self, cos: f32) -> View {
         let split = albedo(cos, self.roughness);
         let lost = 1.0 / (split[0] + split[1]).max(1e-3) - 1.0;
-        View { cos, split, gain: Vec3::ONE + self.f0 * lost }
+        let gain = Vec3::ONE + self.f0 * lost;
+        let specular = (self.f0 * split[0] + split[1]) * gain;
+        View { cos, specular, diffuse: self.diffuse * (Vec3::ONE - specular).max(Vec3::ZERO), gain }
     }
 
     /// Reflected radiance a unit of irradiance facing the light, times the cosine: `f(v, l) * (n . l)`.
@@ -66,16 +77,14 @@ impl Reflectance {
         let (n_h, v_h) = (n.dot(h).clamp(0.0, 1.0), v.dot(h).clamp(0.0, 1.0));
         let fresnel = self.f0 + (Vec3::ONE - self.f0) * pow5(1.0 - v_h);
         let specular = distribution(n_h, self.alpha) * visibility(view.cos, n_l, self.alpha);
-        let diffuse = self.diffuse * (Vec3::ONE - fresnel) * (1.0 / PI);
-        (diffuse + fresnel * view.gain * specular) * n_l
+        (view.diffuse * (1.0 / PI) + fresnel * view.gain * specular) * n_l
     }
 
     /// Light reflected from surroundings: `irradiance` over pi around the normal, `mirrored` around the
     /// reflected direction.
     #[inline(always)]
-    pub(crate) fn surroundings(&self, view: &View, irradiance: Vec3, mirrored: Vec3) -> Vec3 {
-        let specular = (self.f0 * view.split[0] + view.split[1]) * view.gain;
-        self.diffuse * (Vec3::ONE - specular).max(Vec3::ZERO) * irradiance + specular * mirrored
+    pub(crate) fn surroundings(view: &View, irradiance: Vec3, mirrored: Vec3) -> Vec3 {
+        view.diffuse * irradiance + view.specular * mirrored
     }
 }
 
@@ -198,7 +207,7 @@ mod tests {
         for (metallic, roughness) in [(1.0, 0.2), (1.0, 1.0), (0.0, 0.4), (0.0, 1.0)] {
             let surface = Reflectance::new(Vec3::ONE, metallic, roughness);
             for cos in [0.05, 0.4, 1.0] {
-                let out = surface.surroundings(&surface.view(cos), Vec3::ONE, Vec3::ONE).x;
+                let out = Reflectance::surroundings(&surface.view(cos), Vec3::ONE, Vec3::ONE).x;
                 assert!((out - 1.0).abs() < 0.01, "{metallic} {roughness} {cos}: {out}");
             }
         }
@@ -215,7 +224,7 @@ mod tests {
         for i in 0..100 {
             let (v, l) = (direction(i), direction(i + 1000));
             let plain = |a: Vec3, b: Vec3| {
-                let view = View { cos: a.z, split: [0.0; 2], gain: Vec3::ONE };
+                let view = View { cos: a.z, specular: Vec3::ZERO, diffuse: Vec3::ZERO, gain: Vec3::ONE };
                 surface.evaluate(&view, Vec3::Z, a, b, b.z).x / b.z
             };
             assert!((plain(v, l) - plain(l, v)).abs() < 1e-4 * plain(v, l).max(1.0));

@@ -37,10 +37,7 @@ impl CameraView {
         let other = if back.y.abs() > 0.9 { DVec3::Z } else { DVec3::Y };
         let right = unit_or(up.cross(back), unit_or(other.cross(back), DVec3::X));
         Self {
-            world_from_camera: DAffine3 {
-                matrix3: DMat3::from_cols(right, back.cross(right), back),
-                translation: eye,
-            },
+            world_from_camera: DAffine3 { matrix3: DMat3::from_cols(right, back.cross(right), back), translation: eye },
             projection: Projection::Perspective { y_fov, aspect: None, z_near: 0.0, z_far: None },
         }
     }
@@ -76,7 +73,8 @@ impl CameraView {
         let mut view = Self::from_axes(DVec3::ZERO, back, DVec3::Y, FRAMING_FOV);
         let tan_y = libm::tan(f64::from(FRAMING_FOV) * 0.5) * FRAMING_FILL;
         let aspect = if aspect.is_finite() && aspect > 0.0 { f64::from(aspect) } else { 1.0 };
-        view.world_from_camera.translation = framing_eye(&view.world_from_camera.matrix3, bounds, tan_y * aspect, tan_y);
+        view.world_from_camera.translation =
+            framing_eye(&view.world_from_camera.matrix3, bounds, tan_y * aspect, tan_y);
         view
     }
 }

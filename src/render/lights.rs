@@ -25,10 +25,15 @@ pub(crate) struct LightSource {
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Kind {
     /// Parallel light from a disc of this angular radius (tangent).
-    Directional { spread: f32 },
+    Directional {
+        spread: f32,
+    },
     Point,
     /// Cosines of the cone's half angles.
-    Spot { inner: f32, outer: f32 },
+    Spot {
+        inner: f32,
+        outer: f32,
+    },
 }
 
 /// Light arriving at a point.
@@ -130,4 +135,3 @@ pub(crate) fn terminator(geom_cos: f32, shade_cos: f32, between: f32) -> f32 {
     // -g^3 + g^2 + g
     g * (1.0 + g * (1.0 - g))
 }
-

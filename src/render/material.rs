@@ -102,7 +102,8 @@ impl<'a> MaterialMaker<'a> {
         let source = self.scene.textures.get(texture.texture.index())?;
         let id = source.image?;
         let image = self.scene.images.get(id.index())?;
-        if image.width == 0 || image.height == 0 || image.rgba.len() < 4 * image.width as usize * image.height as usize {
+        if image.width == 0 || image.height == 0 || image.rgba.len() < 4 * image.width as usize * image.height as usize
+        {
             return None;
         }
         let key = (id.0, encoding, source.sampler.mip.is_some());

@@ -61,7 +61,7 @@ pub(crate) fn frame(n: Vec3) -> (Vec3, Vec3) {
 pub(crate) fn unit_or(v: Vec3, or: Vec3) -> Vec3 {
     // Scaled by the largest component first, so that tiny and huge vectors neither vanish nor overflow.
     let largest = v.x.abs().max(v.y.abs()).max(v.z.abs());
-    let scaled = v * (1.0 / largest);
+    let scaled = v / largest;
     let length = scaled.dot(scaled).sqrt();
     if length >= 1.0 && length.is_finite() { scaled / length } else { or }
 }

@@ -76,7 +76,10 @@ impl Renderer {
             self.prepared.push(PreparedScene::new(scene.clone()));
             self.prepared.len() - 1
         });
-        #[expect(clippy::cast_possible_truncation, reason = "fewer scenes than instances, which are counted in 32 bits")]
+        #[expect(
+            clippy::cast_possible_truncation,
+            reason = "fewer scenes than instances, which are counted in 32 bits"
+        )]
         let index = index as u32;
         index
     }

@@ -186,9 +186,8 @@ fn surroundings(ctx: &FrameContext<'_>, surface: &Surface, finish: &Finish, view
     // Directions below the facet would mirror what the surface itself hides.
     let below = mirrored.dot(surface.n_geom).min(0.0);
     let mirrored = super::math::unit_or(mirrored - surface.n_geom * (2.0 * below), n);
-    let reflectance = &finish.reflectance;
-    let around = ctx.sky.mirrored(mirrored, reflectance.roughness);
-    reflectance.surroundings(view, ctx.sky.irradiance(n), around) * finish.occlusion
+    let around = ctx.sky.mirrored(mirrored, finish.reflectance.roughness);
+    Reflectance::surroundings(view, ctx.sky.irradiance(n), around) * finish.occlusion
 }
 
 #[inline(always)]

@@ -227,7 +227,9 @@ fn mapped_normal(
     let texel = binding.read(&ctx.scene(info).pyramids, uv, &footprint);
     let raw = Vec3::new(texel.x, texel.y, texel.z) * 2.0 - Vec3::ONE;
     let scale = ctx.material(info).normal_scale;
-    let Some((tangent, bitangent)) = tangent_frame(ctx, info, patch, hit, binding, smooth) else { return (smooth, 1.0) };
+    let Some((tangent, bitangent)) = tangent_frame(ctx, info, patch, hit, binding, smooth) else {
+        return (smooth, 1.0);
+    };
     let n = tangent * (raw.x * scale) + bitangent * (raw.y * scale) + smooth * raw.z;
     (unit_or(n, smooth), raw.length().min(1.0))
 }
@@ -242,7 +244,8 @@ fn tangent_frame(
     binding: &Binding,
     smooth: Vec3,
 ) -> Option<(Vec3, Vec3)> {
-    let stored = if patch.part.tangents.is_empty() { [None; 3] } else { patch.vertices.map(|i| ctx.tangent(hit, info, i)) };
+    let stored =
+        if patch.part.tangents.is_empty() { [None; 3] } else { patch.vertices.map(|i| ctx.tangent(hit, info, i)) };
     let (along, sign) = if let [Some((ta, sign)), Some((tb, _)), Some((tc, _))] = stored {
         let [w, u, v] = patch.weights;
         (ta * w + tb * u + tc * v, sign)

@@ -112,7 +112,12 @@ impl Srgb8 {
         if linear >= 1.0 {
             return 255;
         }
-        let upper = linear.max(0.0).to_bits() >> 16;
+        // NaN fails this too.
+        let positive = linear > 0.0;
+        if !positive {
+            return 0;
+        }
+        let upper = linear.to_bits() >> 16;
         let Some(index) = upper.checked_sub(FIRST_BUCKET) else { return 0 };
         let code = self.bucket[(index as usize).min(BUCKETS - 1)];
         // A bucket holds at most one threshold.

@@ -139,10 +139,7 @@ fn taps(i: u32, from: u32, to: u32) -> ([u32; 3], [f32; 3]) {
     } else {
         let scale = 1.0 / from as f32;
         let last = from - 1;
-        (
-            [base, base + 1, (base + 2).min(last)],
-            [(to - i) as f32 * scale, to as f32 * scale, (i + 1) as f32 * scale],
-        )
+        ([base, base + 1, (base + 2).min(last)], [(to - i) as f32 * scale, to as f32 * scale, (i + 1) as f32 * scale])
     }
 }
 
@@ -151,7 +148,8 @@ pub(super) mod tests {
     use super::*;
 
     pub(crate) fn image(width: u32, height: u32, texel: impl Fn(u32, u32) -> [u8; 4]) -> Image {
-        let rgba: Vec<u8> = (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).flat_map(|(x, y)| texel(x, y)).collect();
+        let rgba: Vec<u8> =
+            (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).flat_map(|(x, y)| texel(x, y)).collect();
         Image { name: String::new(), width, height, rgba: rgba.into() }
     }
 

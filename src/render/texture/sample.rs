@@ -211,7 +211,8 @@ mod tests {
     fn nearest_filter_reads_the_texel_that_holds_the_point() {
         let p = pyramid(4, 4);
         let s = TexSampler { mag: Filter::Nearest, wrap_u: Wrap::Mirror, ..TexSampler::default() };
-        for (u, x) in [(0.1, 0), (0.3, 1), (0.99, 3), (1.01, 3), (1.3, 2), (1.99, 0), (2.01, 0), (-0.01, 0), (-0.3, 1)] {
+        for (u, x) in [(0.1, 0), (0.3, 1), (0.99, 3), (1.01, 3), (1.3, 2), (1.99, 0), (2.01, 0), (-0.01, 0), (-0.3, 1)]
+        {
             let got = sample(&p, &s, Vec2::new(u, 0.1), &Footprint::default());
             assert_eq!(got, p.texel(0, x, 0), "{u}");
         }
