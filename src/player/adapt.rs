@@ -1,7 +1,7 @@
 //! How finely a moving picture is traced so that the frame rate holds.
 
 /// Divisors of the window's width and height that a moving picture may be traced at, finest first.
-pub const DIVISORS: [u32; 4] = [1, 2, 3, 4];
+pub(super) const DIVISORS: [u32; 4] = [1, 2, 3, 4];
 
 /// Frames in a row that must miss the budget before the picture gets coarser.
 const SLOW_FRAMES: u32 = 3;
@@ -16,7 +16,7 @@ const BLEND: f64 = 0.25;
 ///
 /// A frame is taken to cost a fixed part (pose, deform, refit) and a part proportional to the pixels.
 #[derive(Clone, Copy, Debug)]
-pub struct Adapt {
+pub(super) struct Adapt {
     level: usize,
     fixed_s: f64,
     full_trace_s: f64,
@@ -34,7 +34,7 @@ impl Default for Adapt {
 
 impl Adapt {
     /// The divisor of width and height in force.
-    pub fn divisor(&self) -> u32 {
+    pub(super) fn divisor(&self) -> u32 {
         DIVISORS[self.level]
     }
 
@@ -45,7 +45,7 @@ impl Adapt {
 
     /// Takes in a frame traced at `divisor`: seconds before tracing, seconds of tracing, and the seconds that a frame
     /// may take.
-    pub fn record(&mut self, divisor: u32, fixed_s: f64, trace_s: f64, budget_s: f64) {
+    pub(super) fn record(&mut self, divisor: u32, fixed_s: f64, trace_s: f64, budget_s: f64) {
         let full_s = trace_s * f64::from(divisor) * f64::from(divisor);
         if self.measured {
             self.fixed_s += BLEND * (fixed_s - self.fixed_s);
@@ -69,13 +69,13 @@ impl Adapt {
     }
 
     /// Forgets what was measured (another scene, another kind of picture) but keeps the divisor.
-    pub fn forget(&mut self) {
+    pub(super) fn forget(&mut self) {
         *self = Self { level: self.level, ..Self::default() };
     }
 }
 
 /// Size of the picture traced for a window of `width` x `height` at `divisor`; at least one pixel.
-pub fn traced_size(width: u32, height: u32, divisor: u32) -> (u32, u32) {
+pub(super) fn traced_size(width: u32, height: u32, divisor: u32) -> (u32, u32) {
     (width.div_ceil(divisor).max(1), height.div_ceil(divisor).max(1))
 }
 

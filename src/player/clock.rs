@@ -4,17 +4,16 @@ use crate::anim::loop_time;
 
 /// Frames a second of the grid that stepping follows: the default rate of `kinora render`, so that a step
 /// lands on one of its frames.
-pub const STEP_RATE: f64 = 30.0;
+pub(super) const STEP_RATE: f64 = 30.0;
 
 /// Speeds that the keys walk through; any other can be given at the start.
-const SPEEDS: [f64; 16] =
-    [-4.0, -2.0, -1.5, -1.0, -0.75, -0.5, -0.25, -0.1, 0.1, 0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 4.0];
+const SPEEDS: [f64; 16] = [-4.0, -2.0, -1.5, -1.0, -0.75, -0.5, -0.25, -0.1, 0.1, 0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 4.0];
 
 /// Maps the wall clock to a time within the clip, without drift however long it runs.
 ///
 /// Wall times (`now_s`) are seconds on any steady clock; they only need to be the same one in every call.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PlayClock {
+pub(super) struct PlayClock {
     start_s: f64,
     anchor_s: f64,
     speed: f64,
@@ -24,13 +23,13 @@ pub struct PlayClock {
 
 impl PlayClock {
     /// A clock at time 0, running at `speed` clip seconds a second over a clip of `duration_s` seconds.
-    pub fn new(now_s: f64, duration_s: f64, speed: f64) -> Self {
+    pub(super) fn new(now_s: f64, duration_s: f64, speed: f64) -> Self {
         Self { start_s: 0.0, anchor_s: now_s, speed, duration_s, paused: false }
     }
 
     /// Clip time in seconds. While it runs it is in `[0, duration)`; while paused it is the time held, which
     /// may be any.
-    pub fn time_s(&self, now_s: f64) -> f64 {
+    pub(super) fn time_s(&self, now_s: f64) -> f64 {
         if self.paused {
             self.start_s
         } else {
@@ -39,22 +38,22 @@ impl PlayClock {
     }
 
     /// True when time stands still.
-    pub fn is_paused(&self) -> bool {
+    pub(super) fn is_paused(&self) -> bool {
         self.paused
     }
 
     /// True when the picture changes with the wall clock.
-    pub fn is_running(&self) -> bool {
+    pub(super) fn is_running(&self) -> bool {
         !self.paused && self.duration_s > 0.0 && self.speed != 0.0
     }
 
     /// Clip seconds a second; negative plays backwards.
-    pub fn speed(&self) -> f64 {
+    pub(super) fn speed(&self) -> f64 {
         self.speed
     }
 
     /// Length of the loop in seconds.
-    pub fn duration_s(&self) -> f64 {
+    pub(super) fn duration_s(&self) -> f64 {
         self.duration_s
     }
 
@@ -64,23 +63,23 @@ impl PlayClock {
     }
 
     /// Pauses or goes on from the time held.
-    pub fn set_paused(&mut self, now_s: f64, paused: bool) {
+    pub(super) fn set_paused(&mut self, now_s: f64, paused: bool) {
         self.rebase(now_s);
         self.paused = paused;
     }
 
     /// Stops at `time_s`, unclamped: past the clip's end the last pose holds.
-    pub fn hold(&mut self, now_s: f64, time_s: f64) {
+    pub(super) fn hold(&mut self, now_s: f64, time_s: f64) {
         *self = Self { start_s: time_s, anchor_s: now_s, paused: true, ..*self };
     }
 
     /// Goes to `time_s` without pausing or resuming.
-    pub fn seek(&mut self, now_s: f64, time_s: f64) {
+    pub(super) fn seek(&mut self, now_s: f64, time_s: f64) {
         *self = Self { start_s: time_s, anchor_s: now_s, ..*self };
     }
 
     /// Pauses and goes `frames` steps of `1 / STEP_RATE` along the grid of steps, round the loop's ends.
-    pub fn step(&mut self, now_s: f64, frames: i32) {
+    pub(super) fn step(&mut self, now_s: f64, frames: i32) {
         let at = self.time_s(now_s) * STEP_RATE;
         // A time within a millionth of a frame of the grid counts as on it.
         let from = if frames > 0 { libm::floor(at + 1e-6) } else { libm::ceil(at - 1e-6) };
@@ -95,13 +94,13 @@ impl PlayClock {
     }
 
     /// Sets the speed, keeping the time.
-    pub fn set_speed(&mut self, now_s: f64, speed: f64) {
+    pub(super) fn set_speed(&mut self, now_s: f64, speed: f64) {
         self.rebase(now_s);
         self.speed = speed;
     }
 
     /// The next speed up (`direction > 0`) or down of a fixed ladder from -4 to 4 that leaves out 0.
-    pub fn change_speed(&mut self, now_s: f64, direction: i32) {
+    pub(super) fn change_speed(&mut self, now_s: f64, direction: i32) {
         let next = if direction > 0 {
             SPEEDS.into_iter().find(|&s| s > self.speed)
         } else {
@@ -112,8 +111,13 @@ impl PlayClock {
         }
     }
 
+    /// Lets the time so far count from `now_s` on, as if nothing had run before.
+    pub(super) fn restart_wall(&mut self, now_s: f64) {
+        self.anchor_s = now_s;
+    }
+
     /// Starts another clip at its beginning (its end when playing backwards), paused or not as before.
-    pub fn restart(&mut self, now_s: f64, duration_s: f64) {
+    pub(super) fn restart(&mut self, now_s: f64, duration_s: f64) {
         let start_s = if self.speed < 0.0 { duration_s } else { 0.0 };
         *self = Self { start_s, anchor_s: now_s, duration_s, ..*self };
     }
@@ -121,7 +125,7 @@ impl PlayClock {
 
 /// Number of the frame of `kinora render` (at its default rate) nearest to a time: what its noise is seeded
 /// with.
-pub fn frame_number(time_s: f64) -> u64 {
+pub(super) fn frame_number(time_s: f64) -> u64 {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates, and NaN becomes 0")]
     let frame = libm::round(time_s * STEP_RATE) as u64;
     frame

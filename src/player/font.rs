@@ -137,7 +137,7 @@ mod tests {
 
     #[test]
     fn letter_is_drawn_upright_and_not_mirrored() {
-        let mut picture = vec![[b'.'; 5]; 9];
+        let mut picture = [[b'.'; 5]; 9];
         for_each_pixel("F", |x, y| picture[y][x] = b'#');
         assert_eq!(&picture[0], b"#####");
         assert_eq!(&picture[1], b"#....");

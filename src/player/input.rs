@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 /// A key that the player listens to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Key {
+pub(super) enum Key {
     /// A key that types this character; letters in lower case.
     Char(char),
     /// The space bar.
@@ -25,7 +25,7 @@ pub enum Key {
 
 /// A button of the pointer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Button {
+pub(super) enum Button {
     /// Left.
     Left,
     /// Middle.
@@ -36,7 +36,7 @@ pub enum Button {
 
 /// What the window reports. Places are in pixels from the window's top left.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Input {
+pub(super) enum Input {
     /// A key went down (or repeats).
     Key(Key),
     /// Shift went down or up.
@@ -60,7 +60,7 @@ pub enum Input {
 
 /// What a key does.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Action {
+pub(super) enum Action {
     /// Pause or go on.
     TogglePause,
     /// Pause and step this many frames of 1/30 s.
@@ -96,8 +96,13 @@ pub enum Action {
 }
 
 impl Key {
+    /// True when holding the key down does its action again and again.
+    pub(super) fn repeats(self) -> bool {
+        matches!(self.action(), Some(Action::Step(_) | Action::ChangeSpeed(_)))
+    }
+
     /// What the key does; `None` for keys without a meaning.
-    pub fn action(self) -> Option<Action> {
+    pub(super) fn action(self) -> Option<Action> {
         Some(match self {
             Self::Space => Action::TogglePause,
             Self::Char(',') | Self::Left => Action::Step(-1),
@@ -123,7 +128,7 @@ impl Key {
 }
 
 /// The controls as the help shows them: what to press, what it does.
-pub const HELP: [(&str, &str); 19] = [
+pub(super) const HELP: [(&str, &str); 19] = [
     ("left drag", "turn"),
     ("right or Shift drag", "pan"),
     ("wheel", "zoom"),
@@ -147,7 +152,7 @@ pub const HELP: [(&str, &str); 19] = [
 
 /// What a drag that began with `button` does.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Drag {
+pub(super) enum Drag {
     /// Turns the camera.
     Turn,
     /// Moves the camera sideways.
@@ -158,7 +163,7 @@ pub enum Drag {
 
 impl Drag {
     /// The drag that a button begins, on or off the scrub bar.
-    pub fn begin(button: Button, shift: bool, on_bar: bool) -> Self {
+    pub(super) fn begin(button: Button, shift: bool, on_bar: bool) -> Self {
         match (button, on_bar) {
             (Button::Left, true) => Self::Scrub,
             (Button::Left, false) if !shift => Self::Turn,
@@ -190,7 +195,8 @@ mod tests {
                 Key::F1 => "F1".to_owned(),
                 Key::F12 => "F12".to_owned(),
             };
-            let named = HELP.iter().any(|(keys, _)| keys.split(' ').any(|k| k.trim_end_matches(',') == shown || k == shown));
+            let named =
+                HELP.iter().any(|(keys, _)| keys.split(' ').any(|k| k.trim_end_matches(',') == shown || k == shown));
             assert!(named, "{key:?} ({action:?}) is not in the help");
         }
     }

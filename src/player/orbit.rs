@@ -15,7 +15,7 @@ const MOST_NOTCHES: f64 = 50.0;
 
 /// A camera on a sphere round `target`.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Orbit {
+pub(super) struct Orbit {
     target: DVec3,
     distance: f64,
     /// Angle of the camera's place round +Y, radians; 0 looks from +Z.
@@ -30,7 +30,7 @@ impl Orbit {
     ///
     /// A roll of the view is dropped. With the middle behind the camera, or empty bounds, the point lies one
     /// diagonal (at least a metre) ahead.
-    pub fn from_view(view: &CameraView, bounds: Aabb) -> Self {
+    pub(super) fn from_view(view: &CameraView, bounds: Aabb) -> Self {
         let eye = view.world_from_camera.translation;
         let back = view.world_from_camera.matrix3.z_axis.normalize_or(DVec3::Z);
         let diagonal = f64::from(bounds.diagonal());
@@ -60,7 +60,7 @@ impl Orbit {
     }
 
     /// The view from the orbit.
-    pub fn view(&self) -> CameraView {
+    pub(super) fn view(&self) -> CameraView {
         let axes = self.axes();
         CameraView {
             world_from_camera: DAffine3 { matrix3: axes, translation: self.target + axes.z_axis * self.distance },
@@ -69,13 +69,13 @@ impl Orbit {
     }
 
     /// Turns for a pointer motion in units of the window's height: to the right brings the left side into view.
-    pub fn turn(&mut self, dx: f64, dy: f64) {
+    pub(super) fn turn(&mut self, dx: f64, dy: f64) {
         self.yaw = libm::remainder(self.yaw - dx * PI, 2.0 * PI);
         self.pitch = clamp_pitch(self.pitch + dy * PI);
     }
 
     /// Moves so that the target's plane follows a pointer motion in units of the window's height.
-    pub fn pan(&mut self, dx: f64, dy: f64) {
+    pub(super) fn pan(&mut self, dx: f64, dy: f64) {
         let axes = self.axes();
         self.target += (axes.y_axis * dy - axes.x_axis * dx) * self.height_at_target();
     }
@@ -88,7 +88,7 @@ impl Orbit {
     }
 
     /// Goes closer by `notches` of the wheel (away when negative); an orthographic view shrinks its extent.
-    pub fn zoom(&mut self, notches: f64) {
+    pub(super) fn zoom(&mut self, notches: f64) {
         let factor = libm::pow(ZOOM_NOTCH, notches.clamp(-MOST_NOTCHES, MOST_NOTCHES));
         match &mut self.projection {
             Projection::Perspective { .. } => {
@@ -134,10 +134,7 @@ mod tests {
         let back = eye.normalize();
         let right = DVec3::Y.cross(back).normalize();
         CameraView {
-            world_from_camera: DAffine3 {
-                matrix3: DMat3::from_cols(right, back.cross(right), back),
-                translation: eye,
-            },
+            world_from_camera: DAffine3 { matrix3: DMat3::from_cols(right, back.cross(right), back), translation: eye },
             projection: Projection::Perspective { y_fov: 0.7, aspect: None, z_near: 0.0, z_far: None },
         }
     }

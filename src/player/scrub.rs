@@ -13,26 +13,26 @@ const TICK_SPACE: usize = 4;
 
 /// The bar of a window.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct ScrubBar {
+pub(super) struct ScrubBar {
     rect: Rect,
     scale: i32,
 }
 
 impl ScrubBar {
     /// The bar of a window of this size, its lengths `scale` times those of the font.
-    pub fn new(width: i32, height: i32, scale: i32) -> Self {
+    pub(super) fn new(width: i32, height: i32, scale: i32) -> Self {
         let (margin, bar) = (MARGIN * scale, BAR_HEIGHT * scale);
         let rect = Rect { x: margin, y: height - margin - bar, width: (width - 2 * margin).max(1), height: bar };
         Self { rect, scale }
     }
 
     /// Top edge of everything the bar draws.
-    pub fn top(&self) -> i32 {
+    pub(super) fn top(&self) -> i32 {
         self.rect.y
     }
 
     /// True when a press at this place takes hold of the bar.
-    pub fn is_hit(&self, x: f64, y: f64) -> bool {
+    pub(super) fn is_hit(&self, x: f64, y: f64) -> bool {
         let reach = f64::from(MARGIN * self.scale);
         let Rect { x: left, y: top, width, height } = self.rect;
         (f64::from(left) - reach..f64::from(left + width) + reach).contains(&x)
@@ -40,13 +40,13 @@ impl ScrubBar {
     }
 
     /// The time at a horizontal place, clamped to the clip.
-    pub fn time_at(&self, x: f64, duration_s: f64) -> f64 {
+    pub(super) fn time_at(&self, x: f64, duration_s: f64) -> f64 {
         let part = (x - f64::from(self.rect.x)) / f64::from((self.rect.width - 1).max(1));
         duration_s * part.clamp(0.0, 1.0)
     }
 
     /// The horizontal place of a time, in pixels.
-    pub fn place_of(&self, time_s: f64, duration_s: f64) -> i32 {
+    pub(super) fn place_of(&self, time_s: f64, duration_s: f64) -> i32 {
         let part = if duration_s > 0.0 { (time_s / duration_s).clamp(0.0, 1.0) } else { 0.0 };
         #[expect(clippy::cast_possible_truncation, reason = "at most the bar's width")]
         let along = libm::round(part * f64::from((self.rect.width - 1).max(0))) as i32;
@@ -54,7 +54,7 @@ impl ScrubBar {
     }
 
     /// Draws the bar at a time; `ticks` as [`key_times`] gives them.
-    pub fn draw(&self, canvas: &mut Canvas<'_>, time_s: f64, duration_s: f64, ticks: &[f64]) {
+    pub(super) fn draw(&self, canvas: &mut Canvas<'_>, time_s: f64, duration_s: f64, ticks: &[f64]) {
         let rect = self.rect;
         canvas.rect(rect, 0x0010_1418, 170);
         let here = self.place_of(time_s, duration_s);
@@ -66,13 +66,18 @@ impl ScrubBar {
                 canvas.rect(Rect { x, width: 1, ..rect }, 0x00d8_d8d8, 110);
             }
         }
-        let knob = Rect { x: here - self.scale, y: rect.y - self.scale, width: 2 * self.scale + 1, height: rect.height + 2 * self.scale };
+        let knob = Rect {
+            x: here - self.scale,
+            y: rect.y - self.scale,
+            width: 2 * self.scale + 1,
+            height: rect.height + 2 * self.scale,
+        };
         canvas.rect(knob, 0x00ff_ffff, 256);
     }
 }
 
 /// The distinct key times of `clips` in seconds, ascending.
-pub fn key_times(scene: &Scene, clips: &[ClipId]) -> Vec<f64> {
+pub(super) fn key_times(scene: &Scene, clips: &[ClipId]) -> Vec<f64> {
     let samplers = clips.iter().flat_map(|c| &scene.clips[c.index()].samplers);
     let mut times: Vec<f64> = samplers.flat_map(|s| s.times.iter().map(|&t| f64::from(t))).collect();
     times.sort_unstable_by(f64::total_cmp);
