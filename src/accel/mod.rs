@@ -1,8 +1,11 @@
 //! Acceleration structures behind one trait, and the registry of their names.
 
+mod block;
+pub mod bvh2;
 pub mod list;
 mod query;
 mod registry;
+mod sah;
 
 pub use query::{AnyHit, Closest, HitSink, TravRay};
 pub use registry::{AccelKind, AccelSpec, AnyAccel, SpecError};
@@ -76,9 +79,12 @@ pub trait Counter {
     /// A node's box was tested.
     #[inline(always)]
     fn node(&mut self) {}
-    /// A primitive was tested.
+    /// A primitive was tested by itself.
     #[inline(always)]
     fn prim(&mut self) {}
+    /// A block of up to four primitives was tested at once.
+    #[inline(always)]
+    fn block(&mut self) {}
 }
 
 impl Counter for () {}

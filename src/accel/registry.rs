@@ -3,7 +3,8 @@
 use std::{fmt, str::FromStr};
 
 use super::{
-    Accel, AccelConfig, AccelStats, BuildError, Closest, Counter, HitSink, Refit, TravRay, Violation, list::List,
+    Accel, AccelConfig, AccelStats, BuildError, Closest, Counter, HitSink, Refit, TravRay, Violation, bvh2::Bvh2,
+    list::List,
 };
 use crate::{
     geom::{Aabb, Triangles},
@@ -118,7 +119,6 @@ macro_rules! register_accels {
                 }
                 match (self, out) {
                     $((Self::$kind(a), Self::$kind(b)) => a.refit_into(b, prims),)*
-                    #[allow(unreachable_patterns, reason = "reachable as soon as there are two kinds")]
                     _ => Refit::NeedsRebuild,
                 }
             }
@@ -190,6 +190,8 @@ macro_rules! register_accels {
 register_accels! {
     /// Brute force.
     List => List,
+    /// Binary hierarchy of boxes.
+    Bvh2 => Bvh2,
 }
 
 impl AccelKind {

@@ -1,3 +1,8 @@
+use std::{
+    fmt::Debug,
+    ops::{Add, Mul, Neg, Sub},
+};
+
 use super::SimdLevel;
 
 /// The wide types of one level. Only this module implements it; the types of levels that a machine may lack are
@@ -5,4 +10,66 @@ use super::SimdLevel;
 pub trait Simd: Copy + Send + Sync + 'static {
     /// The level that the implementor stands for.
     const LEVEL: SimdLevel;
+    /// Four f32: the planes of two sibling boxes on one axis.
+    type F4: Halves;
+    /// Four f64: a block of four triangles.
+    type D4: Lanes<Elem = f64>;
+    /// The widest f32: one lane a ray of a packet.
+    type F: Lanes<Elem = f32>;
+    /// Half as many f64 as there are lanes in `F`, or all of them where that is a single vector.
+    type D: Lanes<Elem = f64>;
+
+    /// Four f32 as f64, exactly.
+    fn widen(narrow: Self::F4) -> Self::D4;
+}
+
+/// A vector of numbers. Bit i of a mask belongs to lane i.
+pub trait Lanes:
+    Copy + Debug + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Neg<Output = Self>
+{
+    /// `f32` or `f64`.
+    type Elem: Copy + PartialOrd;
+    /// Number of lanes.
+    const LEN: usize;
+    /// The mask of all lanes.
+    const ALL: u32 = (1 << Self::LEN) - 1;
+
+    /// The same number in every lane.
+    fn splat(value: Self::Elem) -> Self;
+    /// The first lanes of a slice. Panics when it is too short.
+    fn load(from: &[Self::Elem]) -> Self;
+    /// Writes all lanes to the front of a slice. Panics when it is too short.
+    fn store(self, to: &mut [Self::Elem]);
+    /// `self < other ? self : other`: `other` where either is NaN.
+    fn min(self, other: Self) -> Self;
+    /// `self > other ? self : other`: `other` where either is NaN.
+    fn max(self, other: Self) -> Self;
+    /// Absolute values.
+    fn abs(self) -> Self;
+    /// `self * b + c`, rounded once or twice depending on the level: only for values that are used with a bound that
+    /// covers both.
+    fn mul_add_loose(self, b: Self, c: Self) -> Self;
+    /// `self * b - c`, as [`Lanes::mul_add_loose`].
+    fn mul_sub_loose(self, b: Self, c: Self) -> Self;
+    /// Lanes where `self < other`; false where either is NaN.
+    fn lt(self, other: Self) -> u32;
+    /// Lanes where `self <= other`; false where either is NaN.
+    fn le(self, other: Self) -> u32;
+}
+
+/// Four lanes as two halves.
+pub trait Halves: Lanes<Elem = f32> {
+    /// Whether halves are to be swapped, ready for use.
+    type Swap: Copy + Debug;
+
+    /// Prepares [`Halves::swapped`].
+    fn swap(on: bool) -> Self::Swap;
+    /// `[2, 3, 0, 1]` when `swap` is on, unchanged else.
+    fn swapped(self, swap: Self::Swap) -> Self;
+    /// `[2, 3, 2, 3]`.
+    fn high_half(self) -> Self;
+    /// Lane 0.
+    fn first(self) -> f32;
+    /// Lane 1.
+    fn second(self) -> f32;
 }

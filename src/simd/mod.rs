@@ -13,6 +13,6 @@ mod scalar;
 mod x86;
 
 pub use dispatch::{Task, dispatch};
-pub use lanes::Simd;
+pub use lanes::{Halves, Lanes, Simd};
 pub use level::SimdLevel;
 pub use scalar::Scalar;

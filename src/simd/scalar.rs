@@ -1,4 +1,9 @@
-use super::{Simd, SimdLevel};
+use std::{
+    array,
+    ops::{Add, Mul, Neg, Sub},
+};
+
+use super::{Halves, Lanes, Simd, SimdLevel};
 
 /// Portable code.
 #[derive(Clone, Copy, Debug)]
@@ -6,4 +11,142 @@ pub struct Scalar;
 
 impl Simd for Scalar {
     const LEVEL: SimdLevel = SimdLevel::Scalar;
+    type F4 = Array<f32, 4>;
+    type D4 = Array<f64, 4>;
+    type F = Array<f32, 8>;
+    type D = Array<f64, 4>;
+
+    #[inline(always)]
+    fn widen(narrow: Self::F4) -> Self::D4 {
+        Array(narrow.0.map(f64::from))
+    }
+}
+
+/// Lanes as a plain array: the reference of every other level.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Array<E, const N: usize>([E; N]);
+
+impl<E: Copy, const N: usize> Array<E, N> {
+    #[inline(always)]
+    fn zip(self, other: Self, f: impl Fn(E, E) -> E) -> Self {
+        Self(array::from_fn(|i| f(self.0[i], other.0[i])))
+    }
+
+    #[inline(always)]
+    fn mask(self, other: Self, f: impl Fn(E, E) -> bool) -> u32 {
+        (0..N).fold(0, |bits, i| bits | (u32::from(f(self.0[i], other.0[i])) << i))
+    }
+}
+
+macro_rules! array_lanes {
+    ($elem:ty) => {
+        impl<const N: usize> Add for Array<$elem, N> {
+            type Output = Self;
+            #[inline(always)]
+            fn add(self, other: Self) -> Self {
+                self.zip(other, |a, b| a + b)
+            }
+        }
+
+        impl<const N: usize> Sub for Array<$elem, N> {
+            type Output = Self;
+            #[inline(always)]
+            fn sub(self, other: Self) -> Self {
+                self.zip(other, |a, b| a - b)
+            }
+        }
+
+        impl<const N: usize> Mul for Array<$elem, N> {
+            type Output = Self;
+            #[inline(always)]
+            fn mul(self, other: Self) -> Self {
+                self.zip(other, |a, b| a * b)
+            }
+        }
+
+        impl<const N: usize> Neg for Array<$elem, N> {
+            type Output = Self;
+            #[inline(always)]
+            fn neg(self) -> Self {
+                Self(self.0.map(|a| -a))
+            }
+        }
+
+        impl<const N: usize> Lanes for Array<$elem, N> {
+            type Elem = $elem;
+            const LEN: usize = N;
+
+            #[inline(always)]
+            fn splat(value: $elem) -> Self {
+                Self([value; N])
+            }
+            #[inline(always)]
+            fn load(from: &[$elem]) -> Self {
+                let from = &from[..N];
+                Self(array::from_fn(|i| from[i]))
+            }
+            #[inline(always)]
+            fn store(self, to: &mut [$elem]) {
+                to[..N].copy_from_slice(&self.0);
+            }
+            #[inline(always)]
+            fn min(self, other: Self) -> Self {
+                self.zip(other, |a, b| if a < b { a } else { b })
+            }
+            #[inline(always)]
+            fn max(self, other: Self) -> Self {
+                self.zip(other, |a, b| if a > b { a } else { b })
+            }
+            #[inline(always)]
+            fn abs(self) -> Self {
+                Self(self.0.map(<$elem>::abs))
+            }
+            #[inline(always)]
+            fn mul_add_loose(self, b: Self, c: Self) -> Self {
+                self * b + c
+            }
+            #[inline(always)]
+            fn mul_sub_loose(self, b: Self, c: Self) -> Self {
+                self * b - c
+            }
+            #[inline(always)]
+            fn lt(self, other: Self) -> u32 {
+                self.mask(other, |a, b| a < b)
+            }
+            #[inline(always)]
+            fn le(self, other: Self) -> u32 {
+                self.mask(other, |a, b| a <= b)
+            }
+        }
+    };
+}
+
+array_lanes!(f32);
+array_lanes!(f64);
+
+impl Halves for Array<f32, 4> {
+    type Swap = bool;
+
+    #[inline(always)]
+    fn swap(on: bool) -> bool {
+        on
+    }
+    #[inline(always)]
+    fn swapped(self, swap: bool) -> Self {
+        let [a, b, c, d] = self.0;
+        if swap { Self([c, d, a, b]) } else { self }
+    }
+    #[inline(always)]
+    fn high_half(self) -> Self {
+        let [_, _, c, d] = self.0;
+        Self([c, d, c, d])
+    }
+    #[inline(always)]
+    fn first(self) -> f32 {
+        self.0[0]
+    }
+    #[inline(always)]
+    fn second(self) -> f32 {
+        self.0[1]
+    }
 }

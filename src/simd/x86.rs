@@ -1,17 +1,204 @@
-use super::{Simd, SimdLevel};
+//! AVX2 and AVX-512. Every `unsafe` here is the call of an intrinsic whose feature is a part of the level: the level's
+//! types are named only by `dispatch`, which has checked the machine.
+#![allow(unused_unsafe, reason = "intrinsics of x86-64's baseline are safe to call, those beside them are not")]
 
-/// AVX2 with FMA. Named only by `dispatch`, which checks the machine first.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Avx2;
+use std::{
+    arch::x86_64::*,
+    ops::{Add, Mul, Neg, Sub},
+};
 
-/// AVX-512 besides. Named only by `dispatch`, which checks the machine first.
+use super::{Halves, Lanes, Simd, SimdLevel};
+
+/// AVX2 with FMA.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Avx512;
+pub struct Avx2;
+
+/// AVX-512 besides.
+#[derive(Clone, Copy, Debug)]
+pub struct Avx512;
 
 impl Simd for Avx2 {
     const LEVEL: SimdLevel = SimdLevel::Avx2;
+    type F4 = F32x4;
+    type D4 = F64x4;
+    type F = F32x8;
+    type D = F64x4;
+
+    #[inline(always)]
+    fn widen(narrow: F32x4) -> F64x4 {
+        widen(narrow)
+    }
 }
 
 impl Simd for Avx512 {
     const LEVEL: SimdLevel = SimdLevel::Avx512;
+    type F4 = F32x4;
+    type D4 = F64x4;
+    type F = F32x16;
+    type D = F64x8;
+
+    #[inline(always)]
+    fn widen(narrow: F32x4) -> F64x4 {
+        widen(narrow)
+    }
+}
+
+#[inline(always)]
+fn widen(narrow: F32x4) -> F64x4 {
+    // SAFETY: AVX is in the level (module head).
+    F64x4(unsafe { _mm256_cvtps_pd(narrow.0) })
+}
+
+/// Calls one intrinsic.
+macro_rules! call {
+    ($intrinsic:ident $(::<$constant:ident>)? ($($arg:expr),*)) => {
+        // SAFETY: the intrinsic's feature is in the level (module head).
+        unsafe { $intrinsic $(::<$constant>)? ($($arg),*) }
+    };
+}
+
+/// Comparison into a bit mask, by vector compare and move or by mask register.
+macro_rules! compare {
+    (vector $cmp:ident $movemask:ident, $predicate:ident, $a:expr, $b:expr) => {
+        call!($movemask(call!($cmp::<$predicate>($a, $b)))).cast_unsigned()
+    };
+    (register $cmp:ident, $predicate:ident, $a:expr, $b:expr) => {
+        u32::from(call!($cmp::<$predicate>($a, $b)))
+    };
+}
+
+macro_rules! vector {
+    ($name:ident($raw:ident), $elem:ident x $len:literal, compare $($compare:ident)+,
+     $set1:ident $load:ident $store:ident $add:ident $sub:ident $mul:ident $min:ident $max:ident
+     $fmadd:ident $fmsub:ident $xor:ident $andnot:ident) => {
+        #[derive(Clone, Copy, Debug)]
+        pub struct $name($raw);
+
+        impl Add for $name {
+            type Output = Self;
+            #[inline(always)]
+            fn add(self, other: Self) -> Self {
+                Self(call!($add(self.0, other.0)))
+            }
+        }
+
+        impl Sub for $name {
+            type Output = Self;
+            #[inline(always)]
+            fn sub(self, other: Self) -> Self {
+                Self(call!($sub(self.0, other.0)))
+            }
+        }
+
+        impl Mul for $name {
+            type Output = Self;
+            #[inline(always)]
+            fn mul(self, other: Self) -> Self {
+                Self(call!($mul(self.0, other.0)))
+            }
+        }
+
+        impl Neg for $name {
+            type Output = Self;
+            #[inline(always)]
+            fn neg(self) -> Self {
+                Self(call!($xor(self.0, call!($set1(-0.0)))))
+            }
+        }
+
+        impl Lanes for $name {
+            type Elem = $elem;
+            const LEN: usize = $len;
+
+            #[inline(always)]
+            fn splat(value: $elem) -> Self {
+                Self(call!($set1(value)))
+            }
+            #[inline(always)]
+            fn load(from: &[$elem]) -> Self {
+                let from: &[$elem; $len] = from[..$len].try_into().expect("the slice has that length");
+                // SAFETY: the array is as long as the unaligned load; the feature is in the level (module head).
+                Self(unsafe { $load(from.as_ptr()) })
+            }
+            #[inline(always)]
+            fn store(self, to: &mut [$elem]) {
+                let to: &mut [$elem; $len] = (&mut to[..$len]).try_into().expect("the slice has that length");
+                // SAFETY: the array is as long as the unaligned store; the feature is in the level (module head).
+                unsafe { $store(to.as_mut_ptr(), self.0) }
+            }
+            #[inline(always)]
+            fn min(self, other: Self) -> Self {
+                Self(call!($min(self.0, other.0)))
+            }
+            #[inline(always)]
+            fn max(self, other: Self) -> Self {
+                Self(call!($max(self.0, other.0)))
+            }
+            #[inline(always)]
+            fn abs(self) -> Self {
+                Self(call!($andnot(call!($set1(-0.0)), self.0)))
+            }
+            #[inline(always)]
+            fn mul_add_loose(self, b: Self, c: Self) -> Self {
+                Self(call!($fmadd(self.0, b.0, c.0)))
+            }
+            #[inline(always)]
+            fn mul_sub_loose(self, b: Self, c: Self) -> Self {
+                Self(call!($fmsub(self.0, b.0, c.0)))
+            }
+            #[inline(always)]
+            fn lt(self, other: Self) -> u32 {
+                compare!($($compare)+, _CMP_LT_OQ, self.0, other.0)
+            }
+            #[inline(always)]
+            fn le(self, other: Self) -> u32 {
+                compare!($($compare)+, _CMP_LE_OQ, self.0, other.0)
+            }
+        }
+    };
+}
+
+vector!(F32x4(__m128), f32 x 4, compare vector _mm_cmp_ps _mm_movemask_ps,
+    _mm_set1_ps _mm_loadu_ps _mm_storeu_ps _mm_add_ps _mm_sub_ps _mm_mul_ps _mm_min_ps _mm_max_ps
+    _mm_fmadd_ps _mm_fmsub_ps _mm_xor_ps _mm_andnot_ps);
+vector!(F32x8(__m256), f32 x 8, compare vector _mm256_cmp_ps _mm256_movemask_ps,
+    _mm256_set1_ps _mm256_loadu_ps _mm256_storeu_ps _mm256_add_ps _mm256_sub_ps _mm256_mul_ps _mm256_min_ps
+    _mm256_max_ps _mm256_fmadd_ps _mm256_fmsub_ps _mm256_xor_ps _mm256_andnot_ps);
+vector!(F64x4(__m256d), f64 x 4, compare vector _mm256_cmp_pd _mm256_movemask_pd,
+    _mm256_set1_pd _mm256_loadu_pd _mm256_storeu_pd _mm256_add_pd _mm256_sub_pd _mm256_mul_pd _mm256_min_pd
+    _mm256_max_pd _mm256_fmadd_pd _mm256_fmsub_pd _mm256_xor_pd _mm256_andnot_pd);
+vector!(F32x16(__m512), f32 x 16, compare register _mm512_cmp_ps_mask,
+    _mm512_set1_ps _mm512_loadu_ps _mm512_storeu_ps _mm512_add_ps _mm512_sub_ps _mm512_mul_ps _mm512_min_ps
+    _mm512_max_ps _mm512_fmadd_ps _mm512_fmsub_ps _mm512_xor_ps _mm512_andnot_ps);
+vector!(F64x8(__m512d), f64 x 8, compare register _mm512_cmp_pd_mask,
+    _mm512_set1_pd _mm512_loadu_pd _mm512_storeu_pd _mm512_add_pd _mm512_sub_pd _mm512_mul_pd _mm512_min_pd
+    _mm512_max_pd _mm512_fmadd_pd _mm512_fmsub_pd _mm512_xor_pd _mm512_andnot_pd);
+
+/// Lane numbers for `vpermilps`.
+#[derive(Clone, Copy, Debug)]
+pub struct Order(__m128i);
+
+impl Halves for F32x4 {
+    type Swap = Order;
+
+    #[inline(always)]
+    fn swap(on: bool) -> Order {
+        Order(if on { call!(_mm_setr_epi32(2, 3, 0, 1)) } else { call!(_mm_setr_epi32(0, 1, 2, 3)) })
+    }
+    #[inline(always)]
+    fn swapped(self, swap: Order) -> Self {
+        Self(call!(_mm_permutevar_ps(self.0, swap.0)))
+    }
+    #[inline(always)]
+    fn high_half(self) -> Self {
+        Self(call!(_mm_movehl_ps(self.0, self.0)))
+    }
+    #[inline(always)]
+    fn first(self) -> f32 {
+        call!(_mm_cvtss_f32(self.0))
+    }
+    #[inline(always)]
+    fn second(self) -> f32 {
+        call!(_mm_cvtss_f32(call!(_mm_movehdup_ps(self.0))))
+    }
 }

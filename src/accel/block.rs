@@ -1,0 +1,262 @@
+//! Leaves: blocks of four triangles in structure-of-arrays form, tested against a ray at once.
+//!
+//! The test evaluates the volumes of [`crate::geom::exact`] in f64, four triangles to a vector, with their bounds. Lanes that
+//! surely miss are dropped; sure hits are kept with their f64 values; only what is left in doubt goes to integers.
+//! f64 costs no more instructions here than f32 would: four f64 fill an AVX register.
+
+use glam::{Mat4, Vec3, Vec3A, Vec4};
+
+use super::{Closest, Counter, HitSink, TravRay, query::blocks};
+use crate::{
+    geom::{
+        Aabb, PrimId, Triangles,
+        exact::{BOUND, Estimate, TriangleHit},
+    },
+    simd::{Lanes, Simd},
+};
+
+/// Marks a lane without a triangle.
+pub(super) const NO_PRIM: u32 = u32::MAX;
+
+/// Four triangles: `corners[corner][axis][lane]`.
+///
+/// Lanes without a triangle, and triangles with a corner that is not finite, have all corners at 0: no area, no hit.
+#[repr(C, align(32))]
+#[derive(Clone, Copy, Debug)]
+pub(super) struct TriBlock {
+    corners: [[[f32; 4]; 3]; 3],
+    prims: [u32; 4],
+}
+
+const _: () = assert!(size_of::<TriBlock>() == 160);
+
+/// What a refit of a block found.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct BlockBounds {
+    pub(super) aabb: Aabb,
+    /// Sum of the half areas of the triangles' boxes.
+    pub(super) own_area: f64,
+}
+
+impl TriBlock {
+    /// A block of up to four triangles whose corners are still to be set by [`TriBlock::refit`].
+    pub(super) fn new(prims: [u32; 4]) -> Self {
+        Self { corners: [[[0.0; 4]; 3]; 3], prims }
+    }
+
+    /// Triangles of the block, in lane order.
+    pub(super) fn prims(&self) -> impl Iterator<Item = PrimId> + '_ {
+        self.prims.iter().filter(|&&p| p != NO_PRIM).map(|&p| PrimId(p))
+    }
+
+    /// Corners of the triangle in a lane.
+    #[inline(always)]
+    pub(super) fn corners(&self, lane: usize) -> [Vec3; 3] {
+        self.corners.map(|[x, y, z]| Vec3::new(x[lane], y[lane], z[lane]))
+    }
+
+    /// Takes the corners from `prims` and returns the box around them.
+    #[inline(always)]
+    pub(super) fn refit(&mut self, prims: &Triangles<'_>) -> BlockBounds {
+        let mut min = Vec3A::INFINITY;
+        let mut max = Vec3A::NEG_INFINITY;
+        let mut own_area = 0.0;
+        let mut rows = [[Vec4::ZERO; 4]; 3];
+        for (lane, &prim) in self.prims.iter().enumerate() {
+            if prim == NO_PRIM {
+                continue;
+            }
+            let [a, b, c] = prims.corners(PrimId(prim)).map(Vec3A::from);
+            // A product with 0 is 0 unless the factor is infinite or NaN.
+            let zero = (a * 0.0 + b * 0.0) + c * 0.0;
+            if zero == Vec3A::ZERO {
+                let (low, high) = (a.min(b).min(c), a.max(b).max(c));
+                min = min.min(low);
+                max = max.max(high);
+                let e = high - low;
+                own_area += f64::from(e.x * e.y + e.y * e.z + e.z * e.x);
+                rows[0][lane] = a.extend(0.0);
+                rows[1][lane] = b.extend(0.0);
+                rows[2][lane] = c.extend(0.0);
+            }
+        }
+        for (corner, [a, b, c, d]) in self.corners.iter_mut().zip(rows) {
+            let axes = Mat4::from_cols(a, b, c, d).transpose();
+            *corner = [axes.x_axis.to_array(), axes.y_axis.to_array(), axes.z_axis.to_array()];
+        }
+        BlockBounds { aabb: Aabb { min: min.into(), max: max.into() }, own_area }
+    }
+
+    /// Evaluates all four triangles; lanes of triangles that surely miss within `[t_near, t_far]` are not in the mask.
+    #[inline(always)]
+    fn evaluate<S: Simd>(&self, ray: &BlockRay<S>, t_near: f64, t_far: f64) -> Evaluated<S> {
+        let corner = |k: usize| self.corners[k].map(|axis| S::widen(S::F4::load(&axis)));
+        let (v0, v1, v2) = (corner(0), corner(1), corner(2));
+        let (e1, e2, s) = (sub::<S>(v1, v0), sub::<S>(v2, v0), sub::<S>(ray.origin, v0));
+        let (p, q) = (cross::<S>(ray.dir, e2), cross::<S>(s, e1));
+        let (det, u, v) = (dot::<S>(e1, p), dot::<S>(s, p), dot::<S>(ray.dir, q));
+        let w = det - u - v;
+        let (n1, n2, ns) = (norm1::<S>(e1), norm1::<S>(e2), norm1::<S>(s));
+        let n12 = n1 * n2;
+        let det_error = ray.reach * n12;
+        let uv_error = ray.reach * ns.mul_add_loose(n1 + n2, n12);
+        let (low, high) = (u.min(v).min(w), u.max(v).max(w));
+        let outside = low.lt(-uv_error) & uv_error.lt(high);
+        let mut mask = S::D4::splat(0.0).lt(det_error) & !outside;
+        let t = dot::<S>(e2, q);
+        let t_error = n12 * ns * S::D4::splat(BOUND);
+        if mask != 0 {
+            let (front, back) = (det_error.lt(det), det.lt(-det_error));
+            let past = |limit: f64| {
+                let limit = S::D4::splat(limit);
+                let (excess, error) = (t - limit * det, t_error + limit * det_error);
+                let (above, below) = (error.lt(excess), excess.lt(-error));
+                ((front & above) | (back & below), (front & below) | (back & above))
+            };
+            mask &= !(past(t_far).0 | past(t_near).1);
+        }
+        let sure = (uv_error.lt(low) | high.lt(-uv_error)) & (det_error * S::D4::splat(4.0)).le(det.abs());
+        Evaluated { mask, sure, det, u, v, t, det_error, uv_error, t_error }
+    }
+
+    /// The hit of one lane of the mask.
+    #[inline(always)]
+    fn lane_hit(&self, ray: &TravRay, lane: usize, sure: u32, spilled: &Spilled) -> Option<TriangleHit> {
+        if sure >> lane & 1 == 1 {
+            TriangleHit::from_sure(ray.range(), self.corners(lane), spilled.estimate(lane))
+        } else {
+            TriangleHit::exactly(ray.range(), self.corners(lane))
+        }
+    }
+
+    /// Offers every triangle of the block that may beat the best.
+    #[inline(always)]
+    pub(super) fn closest<S: Simd, C: Counter, K: HitSink>(
+        &self,
+        ray: &TravRay,
+        block_ray: &BlockRay<S>,
+        best: &mut Closest,
+        sink: &K,
+        count: &mut C,
+    ) {
+        count.block();
+        let evaluated = self.evaluate(block_ray, f64::from(ray.range().t_near), best.t_high());
+        if evaluated.mask == 0 {
+            return;
+        }
+        let spilled = Spilled::new(&evaluated);
+        let mut mask = evaluated.mask;
+        while mask != 0 {
+            let lane = mask.trailing_zeros() as usize;
+            mask &= mask - 1;
+            if let Some(hit) = self.lane_hit(ray, lane, evaluated.sure, &spilled) {
+                best.keep(hit, ray, PrimId(self.prims[lane]), sink);
+            }
+        }
+    }
+
+    /// True when a triangle of the block is hit and `sink` accepts it.
+    #[inline(always)]
+    pub(super) fn occluded<S: Simd, C: Counter, K: HitSink>(
+        &self,
+        ray: &TravRay,
+        block_ray: &BlockRay<S>,
+        sink: &K,
+        count: &mut C,
+    ) -> bool {
+        count.block();
+        let range = ray.range();
+        let evaluated = self.evaluate(block_ray, f64::from(range.t_near), f64::from(range.t_far));
+        if evaluated.mask == 0 {
+            return false;
+        }
+        let spilled = Spilled::new(&evaluated);
+        let mut mask = evaluated.mask;
+        while mask != 0 {
+            let lane = mask.trailing_zeros() as usize;
+            mask &= mask - 1;
+            let hit = self.lane_hit(ray, lane, evaluated.sure, &spilled);
+            if hit.is_some_and(|hit| blocks(&hit, ray, PrimId(self.prims[lane]), sink)) {
+                return true;
+            }
+        }
+        false
+    }
+}
+
+/// A ray spread over the lanes of a block.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct BlockRay<S: Simd> {
+    origin: [S::D4; 3],
+    dir: [S::D4; 3],
+    /// `BOUND * |dir|∞`.
+    reach: S::D4,
+}
+
+impl<S: Simd> BlockRay<S> {
+    #[inline(always)]
+    pub(super) fn new(ray: &TravRay) -> Self {
+        let range = ray.range();
+        let spread = |v: Vec3| v.to_array().map(|c| S::D4::splat(f64::from(c)));
+        let reach = BOUND * f64::from(range.dir.abs().max_element());
+        Self { origin: spread(range.origin), dir: spread(range.dir), reach: S::D4::splat(reach) }
+    }
+}
+
+/// The volumes of four triangles.
+struct Evaluated<S: Simd> {
+    /// Lanes that may hit.
+    mask: u32,
+    /// Lanes whose line surely meets the triangle's inside.
+    sure: u32,
+    det: S::D4,
+    u: S::D4,
+    v: S::D4,
+    t: S::D4,
+    det_error: S::D4,
+    uv_error: S::D4,
+    t_error: S::D4,
+}
+
+/// The volumes in memory, for access by lane.
+struct Spilled([[f64; 4]; 7]);
+
+impl Spilled {
+    #[inline(always)]
+    fn new<S: Simd>(e: &Evaluated<S>) -> Self {
+        let mut rows = [[0.0; 4]; 7];
+        for (row, lanes) in rows.iter_mut().zip([e.det, e.u, e.v, e.t, e.det_error, e.uv_error, e.t_error]) {
+            lanes.store(row);
+        }
+        Self(rows)
+    }
+
+    #[inline(always)]
+    fn estimate(&self, lane: usize) -> Estimate {
+        let [det, u, v, t, det_error, uv_error, t_error] = self.0.map(|row| row[lane]);
+        Estimate { det, u, v, t, det_error, uv_error, t_error }
+    }
+}
+
+type D3<S> = [<S as Simd>::D4; 3];
+
+#[inline(always)]
+fn sub<S: Simd>(a: D3<S>, b: D3<S>) -> D3<S> {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+#[inline(always)]
+fn cross<S: Simd>(a: D3<S>, b: D3<S>) -> D3<S> {
+    let minor = |i: usize, j: usize| a[i].mul_sub_loose(b[j], a[j] * b[i]);
+    [minor(1, 2), minor(2, 0), minor(0, 1)]
+}
+
+#[inline(always)]
+fn dot<S: Simd>(a: D3<S>, b: D3<S>) -> S::D4 {
+    a[0].mul_add_loose(b[0], a[1].mul_add_loose(b[1], a[2] * b[2]))
+}
+
+#[inline(always)]
+fn norm1<S: Simd>(a: D3<S>) -> S::D4 {
+    a[0].abs() + a[1].abs() + a[2].abs()
+}

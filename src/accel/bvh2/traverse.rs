@@ -1,0 +1,318 @@
+use super::{
+    Bvh2, MAX_DEPTH,
+    node::{Link, Pair},
+};
+use crate::{
+    accel::{Closest, Counter, HitSink, TravRay, block::BlockRay, query::ORDINARY_MAX},
+    simd::{Halves, Lanes, Simd},
+};
+
+/// Absolute slack of the f32 node test: above every underflow it may meet.
+const SLACK: f32 = f32::MIN_POSITIVE;
+
+/// Far children to visit: a link and a lower bound of the t at which the ray enters.
+///
+/// A walk keeps at most one entry a level and the builder bounds the depth, so the array cannot overflow.
+struct Stack<T> {
+    entries: [(Link, T); MAX_DEPTH],
+    len: usize,
+}
+
+impl<T: Copy> Stack<T> {
+    #[inline(always)]
+    fn new(zero: T) -> Self {
+        Self { entries: [(Link::NONE, zero); MAX_DEPTH], len: 0 }
+    }
+
+    #[inline(always)]
+    fn push(&mut self, link: Link, t_entry: T) {
+        self.entries[self.len] = (link, t_entry);
+        self.len += 1;
+    }
+
+    #[inline(always)]
+    fn pop(&mut self) -> Option<(Link, T)> {
+        self.len = self.len.checked_sub(1)?;
+        Some(self.entries[self.len])
+    }
+}
+
+/// A way to test a pair of nodes: by f32 vectors for ordinary rays, by f64 scalars for all.
+trait NodeTest: Copy {
+    type T: Copy + PartialOrd;
+    const ZERO: Self::T;
+
+    /// Bits of the children whose boxes the ray may meet before the limit, and where it enters each, rounded down.
+    fn test(&self, pair: &Pair) -> (u32, [Self::T; 2]);
+    /// Nothing beyond the best hit counts any more.
+    fn limit(&mut self, best: &Closest);
+    /// True when what begins at `t_entry` may still matter.
+    fn may_matter(&self, t_entry: Self::T) -> bool;
+}
+
+/// Both boxes of a pair at once, in four lanes: entry into 0, entry into 1, and the negated exits.
+///
+/// # Proof that no box is missed
+/// Take an ordinary ray ([`TravRay::is_ordinary`]) and a box within 2^60 of 0. On an axis with `d != 0` the lanes hold
+/// `a = fl(fl(near - o) * inv_near)` and `b = fl(fl(far - o) * inv_far)`; nothing overflows (2^61 * 2^61) and only the
+/// products may underflow, by less than 2^-149. By the bounds of [`TravRay::inv_near`] and [`TravRay::inv_far`], `a` is at most the
+/// exact entry where that is not negative, and negative or 0 elsewhere, where the ray's `t_near >= 0` takes its place in
+/// the maximum; `b` is at least the exact exit where that is not negative, and a negative exit misses in truth. So with
+/// 2^-126 of slack on the comparison an exact meeting within `[t_near, limit]` is never lost. On an axis with `d = 0`
+/// (always +0) the reciprocal is +inf: a plane on the wrong side gives +inf in its lane and the box is missed, as it is
+/// in truth; a plane on the right side gives -inf, and the origin on a plane 0 * inf = NaN: both lose in the maximum,
+/// whose second operand is the running value.
+#[derive(Clone, Copy)]
+struct FastNode<S: Simd> {
+    origin: [S::F4; 3],
+    inv: [S::F4; 3],
+    swap: [<S::F4 as Halves>::Swap; 3],
+    /// `[t_near, t_near, -limit, -limit]`.
+    limits: S::F4,
+    t_near: f32,
+    /// The limit with slack.
+    cull: f32,
+}
+
+impl<S: Simd> FastNode<S> {
+    #[inline(always)]
+    fn new(ray: &TravRay, limit: f32) -> Self {
+        let range = ray.range();
+        let (near, far) = (ray.inv_near().to_array(), ray.inv_far().to_array());
+        let dir = range.dir.to_array();
+        let inv = |axis: usize| S::F4::load(&[near[axis], near[axis], -far[axis], -far[axis]]);
+        let swap = |axis: usize| S::F4::swap(dir[axis] < 0.0);
+        Self {
+            origin: range.origin.to_array().map(S::F4::splat),
+            inv: [inv(0), inv(1), inv(2)],
+            swap: [swap(0), swap(1), swap(2)],
+            limits: S::F4::load(&[range.t_near, range.t_near, -limit, -limit]),
+            t_near: range.t_near,
+            cull: limit + SLACK,
+        }
+    }
+}
+
+impl<S: Simd> NodeTest for FastNode<S> {
+    type T = f32;
+    const ZERO: f32 = 0.0;
+
+    #[inline(always)]
+    fn test(&self, pair: &Pair) -> (u32, [f32; 2]) {
+        let mut t = self.limits;
+        for axis in 0..3 {
+            let planes = S::F4::load(&pair.planes[axis]).swapped(self.swap[axis]);
+            t = ((planes - self.origin[axis]) * self.inv[axis]).max(t);
+        }
+        let hits = (t + t.high_half()).le(S::F4::splat(SLACK)) & 3;
+        (hits, [t.first(), t.second()])
+    }
+
+    #[inline(always)]
+    fn limit(&mut self, best: &Closest) {
+        let limit = best.t_cull();
+        self.limits = S::F4::load(&[self.t_near, self.t_near, -limit, -limit]);
+        self.cull = limit + SLACK;
+    }
+
+    #[inline(always)]
+    fn may_matter(&self, t_entry: f32) -> bool {
+        t_entry <= self.cull
+    }
+}
+
+/// The same test in f64, one box after the other, for every finite ray and box.
+///
+/// Differences and products of f32 neither overflow nor underflow in f64 here; the relative errors are below 4 * 2^-53,
+/// covered by the widening.
+#[derive(Clone, Copy)]
+struct WideNode {
+    origin: [f64; 3],
+    inv: [f64; 3],
+    t_near: f64,
+    limit: f64,
+}
+
+/// Relative widening of exits.
+const WIDEN: f64 = 1.0 + 16.0 * f64::EPSILON;
+
+impl WideNode {
+    fn new(ray: &TravRay, limit: f64) -> Self {
+        let range = ray.range();
+        let inv = range.dir.to_array().map(|d| 1.0 / f64::from(d));
+        Self { origin: range.origin.to_array().map(f64::from), inv, t_near: f64::from(range.t_near), limit }
+    }
+
+    fn test_child(&self, pair: &Pair, child: usize) -> (bool, f64) {
+        let (mut near, mut far) = (self.t_near, self.limit);
+        for axis in 0..3 {
+            let plane = |i: usize| (f64::from(pair.planes[axis][i]) - self.origin[axis]) * self.inv[axis];
+            let backward = self.inv[axis] < 0.0;
+            let (entry, exit) =
+                if backward { (plane(child + 2), plane(child)) } else { (plane(child), plane(child + 2)) };
+            let (entry, exit) = (entry * (2.0 - WIDEN), exit * WIDEN);
+            near = if entry > near { entry } else { near };
+            far = if exit < far { exit } else { far };
+        }
+        (near <= far, near)
+    }
+}
+
+impl NodeTest for WideNode {
+    type T = f64;
+    const ZERO: f64 = 0.0;
+
+    fn test(&self, pair: &Pair) -> (u32, [f64; 2]) {
+        let ((hit0, t0), (hit1, t1)) = (self.test_child(pair, 0), self.test_child(pair, 1));
+        (u32::from(hit0) | u32::from(hit1) << 1, [t0, t1])
+    }
+
+    fn limit(&mut self, best: &Closest) {
+        self.limit = best.t_high();
+    }
+
+    fn may_matter(&self, t_entry: f64) -> bool {
+        t_entry <= self.limit
+    }
+}
+
+impl Bvh2 {
+    /// True when f32 node tests are proven for this ray and these boxes.
+    #[inline(always)]
+    fn is_ordinary(&self, ray: &TravRay) -> bool {
+        ray.is_ordinary() && self.reach <= ORDINARY_MAX
+    }
+
+    #[inline(always)]
+    pub(super) fn walk_closest<S: Simd, C: Counter, K: HitSink>(
+        &self,
+        ray: &TravRay,
+        best: &mut Closest,
+        sink: &K,
+        count: &mut C,
+    ) {
+        if self.is_ordinary(ray) {
+            self.closest_with::<S, _, C, K>(FastNode::<S>::new(ray, best.t_cull()), ray, best, sink, count);
+        } else {
+            self.walk_closest_wide::<S, C, K>(ray, best, sink, count);
+        }
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn walk_closest_wide<S: Simd, C: Counter, K: HitSink>(
+        &self,
+        ray: &TravRay,
+        best: &mut Closest,
+        sink: &K,
+        count: &mut C,
+    ) {
+        self.closest_with::<S, _, C, K>(WideNode::new(ray, best.t_high()), ray, best, sink, count);
+    }
+
+    #[inline(always)]
+    pub(super) fn walk_occluded<S: Simd, C: Counter, K: HitSink>(
+        &self,
+        ray: &TravRay,
+        sink: &K,
+        count: &mut C,
+    ) -> bool {
+        if self.is_ordinary(ray) {
+            self.occluded_with::<S, _, C, K>(&FastNode::<S>::new(ray, ray.range().t_far), ray, sink, count)
+        } else {
+            self.walk_occluded_wide::<S, C, K>(ray, sink, count)
+        }
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn walk_occluded_wide<S: Simd, C: Counter, K: HitSink>(&self, ray: &TravRay, sink: &K, count: &mut C) -> bool {
+        let test = WideNode::new(ray, f64::from(ray.range().t_far));
+        self.occluded_with::<S, _, C, K>(&test, ray, sink, count)
+    }
+
+    /// Ordered walk: the nearer child first, the farther one on the stack with its entry.
+    #[inline(always)]
+    fn closest_with<S: Simd, N: NodeTest, C: Counter, K: HitSink>(
+        &self,
+        mut test: N,
+        ray: &TravRay,
+        best: &mut Closest,
+        sink: &K,
+        count: &mut C,
+    ) {
+        let block_ray = BlockRay::<S>::new(ray);
+        let mut stack = Stack::new(N::ZERO);
+        let mut link = Link::inner(0);
+        loop {
+            if link.is_leaf() {
+                for block in &self.blocks[link.blocks()] {
+                    block.closest(ray, &block_ray, best, sink, count);
+                }
+                test.limit(best);
+            } else {
+                count.node();
+                let pair = &self.pairs[link.pair()];
+                let (hits, entries) = test.test(pair);
+                if hits == 3 {
+                    let far = usize::from(entries[0] <= entries[1]);
+                    stack.push(pair.links[far], entries[far]);
+                    link = pair.links[1 - far];
+                    continue;
+                }
+                if hits != 0 {
+                    link = pair.links[(hits >> 1) as usize];
+                    continue;
+                }
+            }
+            link = loop {
+                match stack.pop() {
+                    None => return,
+                    Some((link, t_entry)) if test.may_matter(t_entry) => break link,
+                    Some(_) => {}
+                }
+            };
+        }
+    }
+
+    /// Any hit ends the walk; leaves are tested before nodes are followed.
+    #[inline(always)]
+    fn occluded_with<S: Simd, N: NodeTest, C: Counter, K: HitSink>(
+        &self,
+        test: &N,
+        ray: &TravRay,
+        sink: &K,
+        count: &mut C,
+    ) -> bool {
+        let block_ray = BlockRay::<S>::new(ray);
+        let mut stack = Stack::new(());
+        let mut link = Link::inner(0);
+        loop {
+            if link.is_leaf() {
+                for block in &self.blocks[link.blocks()] {
+                    if block.occluded(ray, &block_ray, sink, count) {
+                        return true;
+                    }
+                }
+            } else {
+                count.node();
+                let pair = &self.pairs[link.pair()];
+                let (hits, entries) = test.test(pair);
+                if hits == 3 {
+                    let far = usize::from(entries[0] <= entries[1]);
+                    stack.push(pair.links[far], ());
+                    link = pair.links[1 - far];
+                    continue;
+                }
+                if hits != 0 {
+                    link = pair.links[(hits >> 1) as usize];
+                    continue;
+                }
+            }
+            match stack.pop() {
+                Some((next, ())) => link = next,
+                None => return false,
+            }
+        }
+    }
+}
