@@ -13,10 +13,14 @@ mod man;
 #[cfg(feature = "player")]
 mod play;
 mod pose;
+mod progress;
 mod render;
 mod scene;
 mod settings;
+mod shard;
+mod signals;
 mod stdout;
+mod view;
 
 use std::process::ExitCode;
 

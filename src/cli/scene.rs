@@ -4,7 +4,8 @@ use std::path::Path;
 
 use kinora::{
     anim::ActiveClip,
-    scene::{ClipId, Scene, import},
+    output::SettingsHasher,
+    scene::{ClipId, Scene, builtin, import},
 };
 
 use super::{error::CliError, settings::Settings};
@@ -15,28 +16,47 @@ pub(crate) const SCENE_HELP: &str = "A .gltf or .glb file, or builtin:NAME [defa
 /// Help text of every `--animation` option.
 pub(crate) const ANIMATION_HELP: &str = "Index or name of an animation, `all` together, or `none` for the rest pose";
 
+/// A scene with a digest of the files it was made of.
+#[derive(Debug)]
+pub(crate) struct Loaded {
+    /// The scene.
+    pub(crate) scene: Scene,
+    /// Over the bytes of every file that was read, in the order of reading.
+    pub(crate) digest: [u8; 32],
+}
+
 /// Loads SCENE and prints its warnings, one line each.
 ///
 /// # Errors
 /// A usage error that names the file, the place in it and the reason.
 pub(crate) fn load(scene: Option<&str>, settings: &Settings) -> Result<Scene, CliError> {
-    let scene = settings.pool.install(|| read(scene))?;
-    if settings.verbosity.shows_progress() {
-        for warning in &scene.warnings {
-            eprintln!("warning: {}: {warning}", scene.file);
-        }
-    }
-    Ok(scene)
+    load_with_digest(scene, settings).map(|l| l.scene)
 }
 
-fn read(scene: Option<&str>) -> Result<Scene, CliError> {
-    let Some(text) = scene else {
-        return Err(CliError::usage("SCENE is missing"));
-    };
-    if let Some(name) = text.strip_prefix("builtin:") {
-        return Err(CliError::usage(format!("builtin:{name}: unknown built-in scene")));
+/// As [`load`], with the digest.
+///
+/// # Errors
+/// As [`load`].
+pub(crate) fn load_with_digest(scene: Option<&str>, settings: &Settings) -> Result<Loaded, CliError> {
+    let loaded = settings.pool.install(|| read(scene))?;
+    if settings.verbosity.shows_progress() {
+        for warning in &loaded.scene.warnings {
+            eprintln!("warning: {}: {warning}", loaded.scene.file);
+        }
     }
-    Ok(import::from_path(Path::new(text))?)
+    Ok(loaded)
+}
+
+fn read(scene: Option<&str>) -> Result<Loaded, CliError> {
+    let mut hasher = SettingsHasher::default();
+    let text = scene.map_or_else(|| format!("builtin:{}", builtin::names()[0]), str::to_owned);
+    let scene = if let Some(name) = text.strip_prefix("builtin:") {
+        hasher.add(name, builtin::bytes(name).unwrap_or_default());
+        builtin::load(name)?
+    } else {
+        import::from_path_observed(Path::new(&text), &mut |name, bytes| hasher.add(name, bytes))?
+    };
+    Ok(Loaded { scene, digest: hasher.digest() })
 }
 
 /// The clips that `--animation` asks for, in playing order.

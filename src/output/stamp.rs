@@ -40,9 +40,14 @@ impl SettingsHasher {
         }
     }
 
+    /// The hash of all that was added, to be added to another.
+    pub fn digest(self) -> [u8; 32] {
+        self.0.finalize().into()
+    }
+
     /// The hash of all that was added.
     pub fn finish(self) -> SettingsHash {
-        SettingsHash(self.0.finalize().iter().map(|b| format!("{b:02x}")).collect())
+        SettingsHash(self.digest().iter().map(|b| format!("{b:02x}")).collect())
     }
 }
 

@@ -48,10 +48,24 @@ use error::{Problem, Step};
 /// # Errors
 /// When the file or a file it names cannot be read, or its content is not valid.
 pub fn from_path(path: &Path) -> Result<Scene, ImportError> {
+    from_path_observed(path, &mut |_, _| {})
+}
+
+/// As [`from_path`]; `observe` is shown the bytes of every file as it is read, the scene's own first under an
+/// empty name, the others under their URIs.
+///
+/// # Errors
+/// As [`from_path`].
+pub fn from_path_observed(path: &Path, observe: &mut dyn FnMut(&str, &[u8])) -> Result<Scene, ImportError> {
     let name = path.display().to_string();
     let bytes = files::read_scene(path).map_err(|reason| ImportError::Read { file: name.clone(), reason })?;
+    observe("", &bytes);
     let folder = path.parent().unwrap_or(Path::new(""));
-    from_bytes(&name, &bytes, &mut |uri| files::read_beside(folder, uri))
+    from_bytes(&name, &bytes, &mut |uri| {
+        let bytes = files::read_beside(folder, uri)?;
+        observe(uri, &bytes);
+        Ok(bytes)
+    })
 }
 
 /// Imports from memory; `resolve` is asked for the bytes behind each relative URI, percent-decoded, with `/`
