@@ -108,6 +108,11 @@ impl Layout {
         (0..columns).flat_map(move |c| (0..rows).map(move |r| c * column + r * size))
     }
 
+    /// Columns of an element: more than one for matrices.
+    pub(super) fn columns(&self) -> usize {
+        self.kind.shape().0
+    }
+
     /// Bytes from the first element's start to the last one's end; `None` when that overflows.
     fn span(&self) -> Option<usize> {
         match self.count.checked_sub(1) {
@@ -205,7 +210,15 @@ impl Context<'_> {
 
     /// All numbers of an accessor, element after element, dequantised, sparse values applied.
     pub(super) fn numbers(&self, index: usize) -> Step<Vec<f32>> {
-        let layout = self.layout(index)?;
+        self.decode(index, self.layout(index)?)
+    }
+
+    /// As [`Self::numbers`], normalised integers as they are stored.
+    pub(super) fn raw_numbers(&self, index: usize) -> Step<Vec<f32>> {
+        self.decode(index, Layout { normalized: false, ..self.layout(index)? })
+    }
+
+    fn decode(&self, index: usize, layout: Layout) -> Step<Vec<f32>> {
         let place = format!("accessors[{index}]");
         let bytes = self.elements(index, &layout)?;
         let sparse = self.sparse(index, &layout)?;

@@ -53,7 +53,6 @@ pub enum ImportError {
 /// An [`ImportError`] that does not know its file yet.
 #[derive(Clone, Debug)]
 pub(super) enum Problem {
-    Read { reason: String },
     Invalid { place: String, reason: String },
     Unsupported { extension: String, advice: String },
     TooLarge { place: String, needed: u64, left: u64, limit: u64 },
@@ -65,18 +64,18 @@ impl Problem {
         Self::Invalid { place: place.to_string(), reason: reason.to_string() }
     }
 
-    /// The place in the file, or an empty text.
+    /// The place in the file.
     pub(super) fn place(&self) -> &str {
         match self {
             Self::Invalid { place, .. } | Self::TooLarge { place, .. } => place,
-            Self::Read { .. } | Self::Unsupported { .. } => "",
+            Self::Unsupported { .. } => "extensionsRequired",
         }
     }
 
     /// The reason without the file.
     pub(super) fn reason(&self) -> String {
         match self {
-            Self::Read { reason } | Self::Invalid { reason, .. } => reason.clone(),
+            Self::Invalid { reason, .. } => reason.clone(),
             Self::Unsupported { extension, advice } => format!("{extension} is not supported: {advice}"),
             Self::TooLarge { needed, left, .. } => format!("needs {needed} bytes where {left} are left"),
         }
@@ -85,7 +84,6 @@ impl Problem {
     pub(super) fn in_file(self, file: &str) -> ImportError {
         let file = file.to_owned();
         match self {
-            Self::Read { reason } => ImportError::Read { file, reason },
             Self::Invalid { place, reason } => ImportError::Invalid { file, place, reason },
             Self::Unsupported { extension, advice } => ImportError::Unsupported { file, extension, advice },
             Self::TooLarge { place, needed, left, limit } => ImportError::TooLarge { file, place, needed, left, limit },

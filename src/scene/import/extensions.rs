@@ -55,10 +55,11 @@ pub(super) fn check_required(doc: &Document<'_>) -> Step<()> {
     }
 }
 
-/// Used extensions that are not honoured, each with a warning.
-pub(super) fn ignored(cx: &Context<'_>) -> Vec<String> {
+/// Used extensions that are not honoured, each with a warning. `undeclared` are those that the file uses
+/// without saying so.
+pub(super) fn ignored(cx: &Context<'_>, undeclared: &[String]) -> Vec<String> {
     let mut ignored: Vec<String> = Vec::new();
-    for extension in cx.doc.extensions_used.iter().filter(|e| !is_honoured(e)) {
+    for extension in cx.doc.extensions_used.iter().chain(undeclared).filter(|e| !is_honoured(e)) {
         if !ignored.contains(extension) {
             cx.warnings.add("extensionsUsed", format_args!("{} is ignored", extension.escape_debug()));
             ignored.push(extension.clone());

@@ -85,11 +85,10 @@ fn texture_ref(cx: &Context<'_>, info: Option<&TextureInfo>, place: &str) -> Ste
     let Some(info) = info else { return Ok(None) };
     check_index(info.index.index(), cx.doc.textures.len(), format_args!("{place}.index"), "texture")?;
     let transform = info.transform();
-    let set = transform.and_then(|t| t.tex_coord).or(info.tex_coord);
     let vec2 = |v: Option<[f64; 2]>, default| v.map_or(default, |v| Vec2::from_array(v.map(to_f32)));
     Ok(Some(TextureRef {
         texture: TextureId(info.index.0),
-        tex_coord: set.map_or(0, |s| s.0),
+        tex_coord: info.set(),
         offset: vec2(transform.and_then(|t| t.offset), Vec2::ZERO),
         rotation: transform.and_then(|t| t.rotation).map_or(0.0, to_f32),
         scale: vec2(transform.and_then(|t| t.scale), Vec2::ONE),

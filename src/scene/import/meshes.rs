@@ -153,7 +153,7 @@ fn triangles(cx: &Context<'_>, source: &json::Primitive, mode: u32, count: usize
             }
             let corners = cx.unsigned(index.index(), &place)?;
             if let Some(i) = corners.iter().position(|&c| c as usize >= count) {
-                let reason = format!("index {i} is {}, but there are {count} vertices", corners[i]);
+                let reason = format!("index number {i} is vertex {}, but there are {count} vertices", corners[i]);
                 return Err(Problem::at(place, reason));
             }
             corners

@@ -25,12 +25,14 @@ mod images;
 mod influences;
 mod instancing;
 mod json;
+mod lint;
 mod materials;
 mod meshes;
 mod meshopt;
 mod nodes;
 mod pointer;
 mod skins;
+mod tangents;
 mod textures;
 mod topology;
 mod uri;
@@ -102,10 +104,12 @@ fn import(name: &str, bytes: &[u8], resolve: buffers::Resolver<'_>) -> Step<Scen
     let eval_order = graph::eval_order(&nodes)?;
     let draw_order = graph::draw_order(&cx, &nodes)?;
     let instances = nodes::instances(&cx, &nodes, &draw_order, &meshes)?;
-    let meshes: Vec<_> = meshes.into_iter().map(|m| m.mesh).collect();
+    let mut meshes: Vec<_> = meshes.into_iter().map(|m| m.mesh).collect();
+    tangents::fill(&cx, &mut meshes, &materials)?;
     let clips = clips::import(&cx, &mut nodes, &meshes)?;
     let (cameras, lights) = (cameras::import_cameras(&cx)?, cameras::import_lights(&cx)?);
-    let extensions_ignored = extensions::ignored(&cx);
+    lint::run(&cx);
+    let extensions_ignored = extensions::ignored(&cx, &lint::undeclared(&cx, text));
 
     Ok(Scene {
         file: Path::new(name).file_name().map_or_else(|| name.to_owned(), |f| f.to_string_lossy().into_owned()),
@@ -132,7 +136,13 @@ fn import(name: &str, bytes: &[u8], resolve: buffers::Resolver<'_>) -> Step<Scen
 fn json_text<'a>(bytes: &'a [u8], warnings: &Warnings) -> Step<&'a str> {
     let text =
         std::str::from_utf8(bytes).map_err(|error| Problem::at("the JSON text", format!("is not UTF-8: {error}")))?;
-    let Some(rest) = text.strip_prefix('\u{feff}') else { return Ok(text) };
-    warnings.add("the JSON text", "starts with a byte order mark");
-    Ok(rest)
+    let rest = text.strip_prefix('\u{feff}').unwrap_or(text);
+    if rest.len() < text.len() {
+        warnings.add("the JSON text", "starts with a byte order mark");
+    }
+    match rest.trim_start().bytes().next() {
+        None => Err(Problem::at("the JSON text", "is empty")),
+        Some(b'{') => Ok(rest),
+        Some(_) => Err(Problem::at("the start", "is neither a GLB header nor the brace of a glTF JSON object")),
+    }
 }

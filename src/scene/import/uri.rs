@@ -68,6 +68,9 @@ fn parse_data(rest: &str) -> Result<DataUri<'_>, String> {
     let is_base64 = head.len() >= 7 && head.is_char_boundary(head.len() - 7) && {
         head[head.len() - 7..].eq_ignore_ascii_case(";base64")
     };
+    if head.contains(";;") {
+        return Err("data URI with an empty parameter".to_owned());
+    }
     let media_type = head.split(';').next().unwrap_or_default();
     Ok(DataUri { media_type, is_base64, text })
 }
@@ -198,5 +201,6 @@ mod tests {
         assert_eq!(decode("data:text/plain,a%20b").unwrap(), b"a b");
         assert!(decode("data:;base64,A$==").is_err());
         assert!(parse("data:nothing").is_err());
+        assert!(parse("data:a/b;;base64,AA==").is_err());
     }
 }

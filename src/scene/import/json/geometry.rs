@@ -21,7 +21,6 @@ pub(in super::super) struct BufferView {
     pub(in super::super) byte_offset: Size,
     pub(in super::super) byte_length: Size,
     pub(in super::super) byte_stride: Option<Size>,
-    pub(in super::super) target: Option<Idx>,
     extensions: Option<Box<ViewExtensions>>,
 }
 

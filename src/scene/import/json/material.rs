@@ -58,6 +58,11 @@ pub(in super::super) struct TextureTransform {
 }
 
 impl TextureInfo {
+    /// The texture coordinate set, that of KHR_texture_transform first.
+    pub(in super::super) fn set(&self) -> u32 {
+        self.transform().and_then(|t| t.tex_coord).or(self.tex_coord).map_or(0, |set| set.0)
+    }
+
     pub(in super::super) fn transform(&self) -> Option<&TextureTransform> {
         self.extensions.as_ref().and_then(|e| e.transform.as_ref())
     }
@@ -89,6 +94,19 @@ pub(in super::super) struct SpecularGlossiness {
 }
 
 impl Material {
+    /// Texture coordinate sets that the material reads.
+    pub(in super::super) fn tex_coords(&self) -> impl Iterator<Item = u32> {
+        let pbr = self.pbr_metallic_roughness.as_deref();
+        let own = [
+            self.normal_texture.as_deref(),
+            self.occlusion_texture.as_deref(),
+            self.emissive_texture.as_deref(),
+            pbr.and_then(|p| p.base_color_texture.as_ref()),
+            pbr.and_then(|p| p.metallic_roughness_texture.as_ref()),
+        ];
+        own.into_iter().flatten().map(TextureInfo::set)
+    }
+
     pub(in super::super) fn is_unlit(&self) -> bool {
         self.extensions.as_ref().is_some_and(|e| e.unlit.is_some())
     }

@@ -87,14 +87,25 @@ impl Document<'_> {
         self.extensions.as_ref().and_then(|e| e.lights.as_ref()).map_or(&[], |l| &l.lights)
     }
 
+    /// True when the file says that it cannot do without the extension.
+    pub(super) fn requires(&self, extension: &str) -> bool {
+        self.extensions_required.iter().any(|e| e == extension)
+    }
+
     /// True when the file says that it uses the extension.
     pub(super) fn uses(&self, extension: &str) -> bool {
         self.extensions_used.iter().any(|e| e == extension)
     }
 }
 
+/// The message without the line where `text` is only a part of the file.
+fn without_line(message: &str, is_part: bool) -> &str {
+    message.rsplit_once(" at line ").filter(|_| is_part).map_or(message, |(text, _)| text)
+}
+
 /// Reads JSON text into `T`; the error names the member and the line.
 pub(super) fn read<'a, T: Deserialize<'a>>(text: &'a str, place: &str) -> Step<T> {
+    let is_part = !place.is_empty();
     let mut json = serde_json::Deserializer::from_str(text);
     let value = serde_path_to_error::deserialize(&mut json).map_err(|error| {
         let path = error.path().to_string();
@@ -104,7 +115,7 @@ pub(super) fn read<'a, T: Deserialize<'a>>(text: &'a str, place: &str) -> Step<T
             (place, "." | "?") => place.to_owned(),
             (place, path) => format!("{place}.{path}"),
         };
-        Problem::at(place, error.into_inner())
+        Problem::at(place, without_line(&error.into_inner().to_string(), is_part))
     })?;
     json.end().map_err(|error| Problem::at("the JSON text", error))?;
     Ok(value)

@@ -5,6 +5,9 @@ use super::Idx;
 /// `scenes[]`.
 #[derive(Debug, Deserialize)]
 pub(in super::super) struct Scene {
+    /// Read only so that a name that is no text is found.
+    #[serde(rename = "name")]
+    _name: Option<Box<str>>,
     pub(in super::super) nodes: Option<Box<[Idx]>>,
 }
 
