@@ -62,7 +62,7 @@ fn world_from_instance(scene: &Scene, pose: &Pose, instance: PartInstance) -> DA
 ///
 /// `out` has the part's vertex count; POSITION accessor order. A skinned part ignores its node's transform and
 /// copies; its weights are divided by their sum, and a vertex whose weights sum to zero follows its first
-/// joint. No allocation, one thread.
+/// joint (the skin's first where it names none that exists). No allocation, one thread.
 ///
 /// # Panics
 /// When `out` has another length than the part has vertices.
@@ -192,7 +192,9 @@ fn skin<const N: usize>(
     for (((p, out), joints), weights) in rest.iter().zip(world).zip(joints).zip(weights) {
         let mut weights = weights.map(f64::from);
         let mut sum = weights.iter().fold(0.0, |sum, w| sum + w);
+        let mut joints = *joints;
         if sum == 0.0 {
+            joints = [sole_joint(joints[0], palette); N];
             weights = std::array::from_fn(|k| if k == 0 { 1.0 } else { 0.0 });
             sum = 1.0;
         }
@@ -229,13 +231,19 @@ fn skin_any(
     }
 }
 
+/// The joint that a vertex follows whose weights sum to zero: its first, or the skin's first when there is no such
+/// joint.
+fn sole_joint(first: u16, palette: &[JointColumns]) -> u16 {
+    if usize::from(first) < palette.len() { first } else { 0 }
+}
+
 /// The weighted sum of joint matrices, not divided, and the sum of the weights; the first joint's matrix and 1
 /// when that sum is zero.
 #[inline(always)]
 pub(super) fn blended(joints: &[u16], weights: &[f32], palette: &[JointColumns]) -> ([[f64; 4]; 4], f64) {
     let sum = weights.iter().fold(0.0, |sum, &w| sum + f64::from(w));
     if sum == 0.0 {
-        return (palette[usize::from(joints[0])].0, 1.0);
+        return (palette[usize::from(sole_joint(joints[0], palette))].0, 1.0);
     }
     let mut blend = [[0.0; 4]; 4];
     for (&joint, &weight) in joints.iter().zip(weights) {

@@ -56,7 +56,8 @@ pub struct MeshPart {
 pub struct Influences {
     /// Influences a vertex: 4 times the number of sets.
     pub per_vertex: usize,
-    /// Joint numbers in the skin's list, `per_vertex` each vertex; in range for every skin used with the part.
+    /// Joint numbers in the skin's list, `per_vertex` each vertex; in range for every skin used with the part,
+    /// but for the first joint of a vertex whose weights are all zero, which may be any number.
     pub joints: Vec<u16>,
     /// Weights as the file has them (dequantised, not normalised), `per_vertex` each vertex.
     pub weights: Vec<f32>,

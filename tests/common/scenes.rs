@@ -117,8 +117,13 @@ impl Maker {
         let order: Vec<_> = (0..self.scene.nodes.len() as u32).map(NodeId).collect();
         for &node in &order {
             let Some(mesh) = self.scene.nodes[node.index()].mesh else { continue };
-            for part in 0..self.scene.meshes[mesh.index()].parts.len() as u32 {
-                self.scene.instances.push(PartInstance { node, mesh, part, copy: None });
+            let copies = match &self.scene.nodes[node.index()].copies {
+                Some(copies) => (0..copies.len() as u32).map(Some).collect(),
+                None => vec![None],
+            };
+            let parts = 0..self.scene.meshes[mesh.index()].parts.len() as u32;
+            for (copy, part) in copies.into_iter().flat_map(|copy| parts.clone().map(move |part| (copy, part))) {
+                self.scene.instances.push(PartInstance { node, mesh, part, copy });
             }
         }
         self.scene.eval_order.clone_from(&order);
@@ -224,11 +229,12 @@ pub fn burst(count: u32) -> Scene {
     maker.finish()
 }
 
-/// Two boxes that nothing moves.
+/// Two boxes that nothing moves, with a clip that does nothing.
 pub fn still() -> Scene {
     let mut maker = Maker::default();
     let mesh = maker.mesh(cuboid(Vec3::splat(0.5)));
     maker.node(None, SceneNode { mesh: Some(mesh), ..node(DVec3::ZERO) });
     maker.node(None, SceneNode { mesh: Some(mesh), ..node(DVec3::new(2.0, 0.0, 0.0)) });
+    maker.scene.clips.push(Clip::default());
     maker.finish()
 }

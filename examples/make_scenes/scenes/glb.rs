@@ -176,6 +176,20 @@ impl Glb {
         self.floats(&values, false)
     }
 
+    /// Inverse bind matrices of joints at the given places and rotations, for positions in units of `unit`
+    /// metres.
+    pub fn inverse_binds(&mut self, binds: &[(DVec3, DQuat)], unit: f64) -> Accessor {
+        let matrix = |&(place, turn): &(DVec3, DQuat)| {
+            let back = turn.conjugate();
+            let columns = [DVec3::X, DVec3::Y, DVec3::Z].map(|axis| (back * axis * unit).as_vec3());
+            let t = (back * -place).as_vec3();
+            let [x, y, z] = columns;
+            [x.x, x.y, x.z, 0.0, y.x, y.y, y.z, 0.0, z.x, z.y, z.z, 0.0, t.x, t.y, t.z, 1.0]
+        };
+        let values: Vec<[f32; 16]> = binds.iter().map(matrix).collect();
+        self.floats(&values, false)
+    }
+
     /// Unit vectors in three signed bytes each (KHR_mesh_quantization).
     pub fn normals_i8(&mut self, values: &[DVec3]) -> Accessor {
         self.quantized = true;
@@ -282,6 +296,11 @@ impl Glb {
         self.nodes.len() - 1
     }
 
+    /// Puts `child` under `parent`.
+    pub fn adopt(&mut self, parent: usize, child: usize) {
+        self.nodes[parent].children.push(child);
+    }
+
     /// Adds an animation.
     pub fn animation(&mut self, name: &str, animation: &Animation) {
         self.animations.push(format!(
@@ -383,7 +402,10 @@ impl Glb {
 const SAMPLER: &str = "{\"magFilter\":9729,\"minFilter\":9987}";
 
 fn node_json(node: &Node) -> String {
-    let mut fields = vec![format!("\"name\":\"{}\"", node.name)];
+    let mut fields = Vec::new();
+    if !node.name.is_empty() {
+        fields.push(format!("\"name\":\"{}\"", node.name));
+    }
     if node.translation != DVec3::ZERO {
         fields.push(format!("\"translation\":[{}]", numbers(&node.translation.to_array())));
     }

@@ -3,6 +3,8 @@
 
 pub mod atlas;
 pub mod bake;
+pub mod cloth;
+pub mod explode;
 pub mod figure;
 pub mod glb;
 pub mod maths;
@@ -13,5 +15,5 @@ pub mod shape;
 
 /// Every built-in scene: its name and the bytes of its `.glb`.
 pub fn all() -> Vec<(&'static str, Vec<u8>)> {
-    vec![("walk", figure::walk(1.0))]
+    vec![("walk", figure::walk(1.0)), ("cloth", cloth::cloth()), ("explode", explode::explode())]
 }

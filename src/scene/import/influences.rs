@@ -32,6 +32,7 @@ pub(super) fn import(
     let mut all =
         Influences { per_vertex, joints: vec![0; count * per_vertex], weights: vec![0.0; count * per_vertex] };
     let mut max_joint = None;
+    let mut first_joints = Vec::new();
     for set in 0..sets {
         let (joints, weights) = read_set(cx, attributes, set, count, place)?;
         for vertex in 0..count {
@@ -47,9 +48,23 @@ pub(super) fn import(
                 }
             }
         }
+        if set == 0 {
+            first_joints = joints;
+        }
     }
+    keep_weightless(&mut all, &first_joints);
     check_weights(cx, &all, place);
     Ok((Some(all), max_joint))
+}
+
+/// Gives vertices without any weight their first joint back, which is what they follow; it may be out of range.
+fn keep_weightless(all: &mut Influences, first_joints: &[u32]) {
+    let vertices = all.weights.chunks_exact(all.per_vertex).zip(all.joints.chunks_exact_mut(all.per_vertex));
+    for ((weights, joints), first) in vertices.zip(first_joints.iter().step_by(4)) {
+        if weights.iter().all(|&w| w == 0.0) {
+            joints[0] = u16::try_from(*first).unwrap_or(u16::MAX);
+        }
+    }
 }
 
 fn read_set(
