@@ -102,12 +102,11 @@ impl Drives {
     }
 }
 
-/// True unless every key of the channel equals the rest value of its target.
+/// True unless every key of the channel equals the rest value of its target, or it drives a matrix and so nothing.
 fn changes(scene: &Scene, clip: &Clip, channel: &Channel) -> bool {
     let sampler = &clip.samplers[channel.sampler as usize];
     let trs = |node: NodeId| match &scene.nodes[node.index()].local {
         LocalTransform::Trs(trs) => Some(*trs),
-        // Driving a matrix takes it apart, which may change it.
         LocalTransform::Matrix(_) => None,
     };
     let rest: Option<Vec<f64>> = match channel.target {
@@ -119,7 +118,7 @@ fn changes(scene: &Scene, clip: &Clip, channel: &Channel) -> bool {
             Some(scene.meshes[mesh.index()].weights.iter().map(|&w| f64::from(w)).collect())
         }
     };
-    rest.is_none_or(|rest| !holds(sampler, &rest))
+    rest.is_some_and(|rest| !holds(sampler, &rest))
 }
 
 /// A node's morph weights in the rest pose.

@@ -4,9 +4,9 @@ use glam::DAffine3;
 
 use super::{
     sampler,
-    transform::{from_matrix, from_trs, local_matrix, local_trs, product},
+    transform::{from_matrix, from_trs, local_matrix, product},
 };
-use crate::scene::{Channel, ChannelTarget, Clip, ClipId, NodeId, Scene, SkinId, Trs};
+use crate::scene::{Channel, ChannelTarget, Clip, ClipId, LocalTransform, NodeId, Scene, SkinId, Trs};
 
 /// A clip playing at a time.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -39,7 +39,7 @@ struct Layout {
     rest_local: Vec<DAffine3>,
     /// Place of each node in `rest_trs`, or [`UNDRIVEN`].
     driven_slot: Vec<u32>,
-    /// Rest components of every node that some channel drives.
+    /// Rest components of every node that some channel drives, save those given as a matrix.
     rest_trs: Vec<Trs>,
     /// Where each node's morph weights lie.
     weight_ranges: Vec<Range<usize>>,
@@ -98,8 +98,8 @@ impl Pose {
 
     /// Evaluates `clips` together over the rest pose; a later clip wins where two drive the same target.
     ///
-    /// `world_from_scene` is applied above the roots. A node given as a matrix is taken apart while a channel
-    /// drives it. Weights driven at a node win over those driven at its mesh. Only nodes at or below one that
+    /// `world_from_scene` is applied above the roots. Channels on a node that is given as a matrix do nothing
+    /// (importers take such matrices apart where that loses nothing). Weights driven at a node win over those driven at its mesh. Only nodes at or below one that
     /// is driven, or was in the evaluation before, are computed anew.
     ///
     /// Cost: O(channels log keys + nodes + joints), no allocation, one thread.
@@ -125,7 +125,11 @@ impl Pose {
             else {
                 continue;
             };
-            let slot = self.layout.driven_slot[node.index()] as usize;
+            let slot = self.layout.driven_slot[node.index()];
+            if slot == UNDRIVEN {
+                continue;
+            }
+            let slot = slot as usize;
             let sampler = &clip.samplers[channel.sampler as usize];
             let trs = &mut self.trs[slot];
             match channel.target {
@@ -254,9 +258,10 @@ fn driven_nodes(scene: &Scene) -> (Vec<u32>, Vec<Trs>) {
         if let ChannelTarget::Translation(node) | ChannelTarget::Rotation(node) | ChannelTarget::Scale(node) =
             channel.target
             && slots[node.index()] == UNDRIVEN
+            && let LocalTransform::Trs(trs) = scene.nodes[node.index()].local
         {
             slots[node.index()] = u32::try_from(rest.len()).expect("as many driven nodes as nodes at most");
-            rest.push(local_trs(&scene.nodes[node.index()].local));
+            rest.push(trs);
         }
     }
     (slots, rest)

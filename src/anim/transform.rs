@@ -1,6 +1,6 @@
 //! Local transforms as `f64` matrices that stay finite.
 
-use glam::{DAffine3, DMat3, DMat4, DQuat, DVec3};
+use glam::{DAffine3, DMat3, DMat4, DVec3};
 
 use super::quat;
 use crate::scene::{LocalTransform, Trs};
@@ -44,26 +44,6 @@ pub(super) fn local_matrix(local: &LocalTransform) -> DAffine3 {
         LocalTransform::Trs(trs) => from_trs(trs),
         LocalTransform::Matrix(m) => from_matrix(m),
     }
-}
-
-/// The components that channels replace.
-///
-/// A matrix is taken apart, losing its shear; a singular one keeps its column lengths as scale and no
-/// rotation.
-pub(super) fn local_trs(local: &LocalTransform) -> Trs {
-    let m = match local {
-        LocalTransform::Trs(trs) => return *trs,
-        LocalTransform::Matrix(m) => from_matrix(m),
-    };
-    let columns = m.matrix3;
-    let lengths = DVec3::new(columns.x_axis.length(), columns.y_axis.length(), columns.z_axis.length());
-    let det = columns.determinant();
-    if det == 0.0 || !det.is_finite() {
-        return Trs { translation: m.translation, rotation: DQuat::IDENTITY, scale: lengths };
-    }
-    let scale = DVec3::new(lengths.x * det.signum(), lengths.y, lengths.z);
-    let axes = DMat3::from_cols(columns.x_axis / scale.x, columns.y_axis / scale.y, columns.z_axis / scale.z);
-    Trs { translation: m.translation, rotation: quat::normalized(DQuat::from_mat3(&axes)), scale }
 }
 
 /// `m` divided by its largest entry, so that products of entries neither overflow nor vanish, and that entry's
