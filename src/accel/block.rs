@@ -10,7 +10,7 @@ use super::{Closest, Counter, HitSink, TravRay, query::blocks};
 use crate::{
     geom::{
         Aabb, PrimId, Triangles,
-        exact::{BOUND, Estimate, TriangleHit},
+        exact::{BOUND, Quotients, TriangleHit},
     },
     simd::{Lanes, Simd},
 };
@@ -87,9 +87,10 @@ impl TriBlock {
         BlockBounds { aabb: Aabb { min: min.into(), max: max.into() }, own_area }
     }
 
-    /// Evaluates all four triangles; lanes of triangles that surely miss within `[t_near, t_far]` are not in the mask.
+    /// Evaluates all four triangles. Lanes of triangles that surely miss, or are surely hit outside of
+    /// `[t_near, t_limit]`, are not in the mask; `t_limit` is at most the ray's end.
     #[inline(always)]
-    fn evaluate<S: Simd>(&self, ray: &BlockRay<S>, t_near: f64, t_far: f64) -> Evaluated<S> {
+    fn evaluate<S: Simd>(&self, ray: &BlockRay<S>, t_limit: f64) -> Evaluated<S> {
         let corner = |k: usize| self.corners[k].map(|axis| S::widen(S::F4::load(&axis)));
         let (v0, v1, v2) = (corner(0), corner(1), corner(2));
         let (e1, e2, s) = (sub::<S>(v1, v0), sub::<S>(v2, v0), sub::<S>(ray.origin, v0));
@@ -102,31 +103,19 @@ impl TriBlock {
         let uv_error = ray.reach * ns.mul_add_loose(n1 + n2, n12);
         let (low, high) = (u.min(v).min(w), u.max(v).max(w));
         let outside = low.lt(-uv_error) & uv_error.lt(high);
-        let mut mask = S::D4::splat(0.0).lt(det_error) & !outside;
-        let t = dot::<S>(e2, q);
         let t_error = n12 * ns * S::D4::splat(BOUND);
-        if mask != 0 {
-            let (front, back) = (det_error.lt(det), det.lt(-det_error));
-            let past = |limit: f64| {
-                let limit = S::D4::splat(limit);
-                let (excess, error) = (t - limit * det, t_error + limit * det_error);
-                let (above, below) = (error.lt(excess), excess.lt(-error));
-                ((front & above) | (back & below), (front & below) | (back & above))
-            };
-            mask &= !(past(t_far).0 | past(t_near).1);
-        }
-        let sure = (uv_error.lt(low) | high.lt(-uv_error)) & (det_error * S::D4::splat(4.0)).le(det.abs());
-        Evaluated { mask, sure, det, u, v, t, det_error, uv_error, t_error }
-    }
-
-    /// The hit of one lane of the mask.
-    #[inline(always)]
-    fn lane_hit(&self, ray: &TravRay, lane: usize, sure: u32, spilled: &Spilled) -> Option<TriangleHit> {
-        if sure >> lane & 1 == 1 {
-            TriangleHit::from_sure(ray.range(), self.corners(lane), spilled.estimate(lane))
-        } else {
-            TriangleHit::exactly(ray.range(), self.corners(lane))
-        }
+        // As `Quotients::bounded`.
+        let inv_det = S::D4::splat(1.0) / det;
+        let t = dot::<S>(e2, q) * inv_det;
+        let slack = t.abs().mul_add_loose(det_error, t_error) * inv_det.abs() * S::D4::splat(2.0);
+        let slack = t.abs().mul_add_loose(S::D4::splat(4.0 * f64::EPSILON), slack);
+        let (t_low, t_high) = (t - slack, t + slack);
+        let solid = (det_error * S::D4::splat(4.0)).le(det.abs());
+        let beyond = solid & (S::D4::splat(t_limit).lt(t_low) | t_high.lt(ray.t_near));
+        let mask = S::D4::splat(0.0).lt(det_error) & !(outside | beyond);
+        let inside = uv_error.lt(low) | high.lt(-uv_error);
+        let sure = solid & inside & ray.t_near.le(t_low) & t_high.le(ray.t_far);
+        Evaluated { mask, sure, rows: [t_low, t_high, inv_det, u, v, det_error, uv_error] }
     }
 
     /// Offers every triangle of the block that may beat the best.
@@ -140,17 +129,20 @@ impl TriBlock {
         count: &mut C,
     ) {
         count.block();
-        let evaluated = self.evaluate(block_ray, f64::from(ray.range().t_near), best.t_high());
+        let evaluated = self.evaluate(block_ray, best.t_high());
         if evaluated.mask == 0 {
             return;
         }
         let spilled = Spilled::new(&evaluated);
         let mut mask = evaluated.mask;
         while mask != 0 {
-            let lane = mask.trailing_zeros() as usize;
+            let lane = (mask.trailing_zeros() & 3) as usize;
             mask &= mask - 1;
-            if let Some(hit) = self.lane_hit(ray, lane, evaluated.sure, &spilled) {
-                best.keep(hit, ray, PrimId(self.prims[lane]), sink);
+            let prim = PrimId(self.prims[lane]);
+            if evaluated.sure >> lane & 1 == 1 {
+                best.keep(spilled.hit(self, lane), ray, prim, sink);
+            } else {
+                best.offer_exactly(ray, self.corners(lane), prim, sink);
             }
         }
     }
@@ -165,22 +157,33 @@ impl TriBlock {
         count: &mut C,
     ) -> bool {
         count.block();
-        let range = ray.range();
-        let evaluated = self.evaluate(block_ray, f64::from(range.t_near), f64::from(range.t_far));
+        let evaluated = self.evaluate(block_ray, f64::from(ray.range().t_far));
         if evaluated.mask == 0 {
             return false;
         }
         let spilled = Spilled::new(&evaluated);
         let mut mask = evaluated.mask;
         while mask != 0 {
-            let lane = mask.trailing_zeros() as usize;
+            let lane = (mask.trailing_zeros() & 3) as usize;
             mask &= mask - 1;
-            let hit = self.lane_hit(ray, lane, evaluated.sure, &spilled);
-            if hit.is_some_and(|hit| blocks(&hit, ray, PrimId(self.prims[lane]), sink)) {
+            let prim = PrimId(self.prims[lane]);
+            let blocked = if evaluated.sure >> lane & 1 == 1 {
+                K::ACCEPTS_ALL || blocks(&spilled.hit(self, lane), ray, prim, sink)
+            } else {
+                self.blocks_exactly(ray, lane, sink)
+            };
+            if blocked {
                 return true;
             }
         }
         false
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn blocks_exactly<K: HitSink>(&self, ray: &TravRay, lane: usize, sink: &K) -> bool {
+        let hit = TriangleHit::exactly(ray.range(), self.corners(lane));
+        hit.is_some_and(|hit| blocks(&hit, ray, PrimId(self.prims[lane]), sink))
     }
 }
 
@@ -191,50 +194,54 @@ pub(super) struct BlockRay<S: Simd> {
     dir: [S::D4; 3],
     /// `BOUND * |dir|∞`.
     reach: S::D4,
+    t_near: S::D4,
+    t_far: S::D4,
 }
 
 impl<S: Simd> BlockRay<S> {
     #[inline(always)]
     pub(super) fn new(ray: &TravRay) -> Self {
         let range = ray.range();
-        let spread = |v: Vec3| v.to_array().map(|c| S::D4::splat(f64::from(c)));
+        let spread = |c: f32| S::D4::splat(f64::from(c));
         let reach = BOUND * f64::from(range.dir.abs().max_element());
-        Self { origin: spread(range.origin), dir: spread(range.dir), reach: S::D4::splat(reach) }
+        Self {
+            origin: range.origin.to_array().map(spread),
+            dir: range.dir.to_array().map(spread),
+            reach: S::D4::splat(reach),
+            t_near: spread(range.t_near),
+            t_far: spread(range.t_far),
+        }
     }
 }
 
-/// The volumes of four triangles.
+/// Four triangles after the f64 test.
 struct Evaluated<S: Simd> {
     /// Lanes that may hit.
     mask: u32,
-    /// Lanes whose line surely meets the triangle's inside.
+    /// Lanes that surely hit, within the ray's range.
     sure: u32,
-    det: S::D4,
-    u: S::D4,
-    v: S::D4,
-    t: S::D4,
-    det_error: S::D4,
-    uv_error: S::D4,
-    t_error: S::D4,
+    /// Bounds on t, then the fields of [`Quotients`].
+    rows: [S::D4; 7],
 }
 
-/// The volumes in memory, for access by lane.
+/// The rows in memory, for access by lane.
 struct Spilled([[f64; 4]; 7]);
 
 impl Spilled {
     #[inline(always)]
-    fn new<S: Simd>(e: &Evaluated<S>) -> Self {
+    fn new<S: Simd>(evaluated: &Evaluated<S>) -> Self {
         let mut rows = [[0.0; 4]; 7];
-        for (row, lanes) in rows.iter_mut().zip([e.det, e.u, e.v, e.t, e.det_error, e.uv_error, e.t_error]) {
+        for (row, lanes) in rows.iter_mut().zip(evaluated.rows) {
             lanes.store(row);
         }
         Self(rows)
     }
 
     #[inline(always)]
-    fn estimate(&self, lane: usize) -> Estimate {
-        let [det, u, v, t, det_error, uv_error, t_error] = self.0.map(|row| row[lane]);
-        Estimate { det, u, v, t, det_error, uv_error, t_error }
+    fn hit(&self, block: &TriBlock, lane: usize) -> TriangleHit {
+        let [t_low, t_high, inv_det, u, v, det_error, uv_error] = self.0.map(|row| row[lane]);
+        let quotients = Quotients { inv_det, u, v, det_error, uv_error };
+        TriangleHit { corners: block.corners(lane), t_low, t_high, quotients }
     }
 }
 

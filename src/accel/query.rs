@@ -125,6 +125,8 @@ fn is_ordinary(origin: Vec3, dir: Vec3) -> bool {
 #[derive(Clone, Copy, Debug)]
 pub struct Closest {
     best: Option<(TriangleHit, InstanceId, PrimId)>,
+    /// At most the exact t of the best hit; looked at only if there is one.
+    t_low: f64,
     /// At least the exact t of the best hit, or the ray's end.
     t_high: f64,
     /// At least `t_high`.
@@ -135,7 +137,7 @@ impl Closest {
     /// Nothing hit yet.
     #[inline(always)]
     pub fn new(ray: &TravRay) -> Self {
-        Self { best: None, t_high: f64::from(ray.range.t_far), cull: ray.range.t_far }
+        Self { best: None, t_low: 0.0, t_high: f64::from(ray.range.t_far), cull: ray.range.t_far }
     }
 
     /// Nothing beyond this `t` can change the answer: at least the best hit's exact t, or the ray's end.
@@ -165,26 +167,42 @@ impl Closest {
         }
     }
 
-    /// Keeps `hit` when it beats the best and `sink` accepts it.
+    /// As [`Closest::offer`], by integers alone.
+    #[cold]
+    #[inline(never)]
+    pub(super) fn offer_exactly<K: HitSink>(&mut self, ray: &TravRay, corners: [Vec3; 3], prim: PrimId, sink: &K) {
+        if let Some(hit) = TriangleHit::exactly(&ray.range, corners) {
+            self.keep(hit, ray, prim, sink);
+        }
+    }
+
+    /// Keeps `hit`, which lies in the ray's range, when it beats the best and `sink` accepts it.
     #[inline(always)]
     pub fn keep<K: HitSink>(&mut self, hit: TriangleHit, ray: &TravRay, prim: PrimId, sink: &K) {
-        if hit.t_low() > self.t_high {
+        let surely_first = self.best.is_none() || hit.t_high < self.t_low;
+        if !surely_first && (hit.t_low > self.t_high || !self.wins_exactly(&hit, ray, prim, sink)) {
             return;
         }
         let (instance, prim) = sink.key(prim);
-        if let Some((best, best_instance, best_prim)) = &self.best {
-            match hit.cmp_t(best, &ray.range) {
-                Ordering::Greater => return,
-                Ordering::Equal if (*best_instance, *best_prim) <= (instance, prim) => return,
-                _ => {}
-            }
-        }
         if !K::ACCEPTS_ALL && !sink.accept(&rounded(&hit, ray, instance, prim)) {
             return;
         }
         self.best = Some((hit, instance, prim));
-        self.t_high = hit.t_high();
-        self.cull = round_up(hit.t_high());
+        self.t_low = hit.t_low;
+        self.t_high = hit.t_high;
+        self.cull = round_up(hit.t_high);
+    }
+
+    /// Decides between hits whose bounds on t overlap.
+    #[cold]
+    #[inline(never)]
+    fn wins_exactly<K: HitSink>(&self, hit: &TriangleHit, ray: &TravRay, prim: PrimId, sink: &K) -> bool {
+        let Some((best, best_instance, best_prim)) = &self.best else { return true };
+        match hit.cmp_t(best, &ray.range) {
+            Ordering::Less => true,
+            Ordering::Greater => false,
+            Ordering::Equal => sink.key(prim) < (*best_instance, *best_prim),
+        }
     }
 }
 

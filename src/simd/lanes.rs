@@ -1,6 +1,6 @@
 use std::{
     fmt::Debug,
-    ops::{Add, Mul, Neg, Sub},
+    ops::{Add, Div, Mul, Neg, Sub},
 };
 
 use super::SimdLevel;
@@ -25,7 +25,7 @@ pub trait Simd: Copy + Send + Sync + 'static {
 
 /// A vector of numbers. Bit i of a mask belongs to lane i.
 pub trait Lanes:
-    Copy + Debug + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Neg<Output = Self>
+    Copy + Debug + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self> + Neg<Output = Self>
 {
     /// `f32` or `f64`.
     type Elem: Copy + PartialOrd;

@@ -5,6 +5,7 @@
 //! is compiled for the level. Results never depend on the level: no kernel contracts `a * b + c` where a
 //! result is kept.
 
+mod barrier;
 mod dispatch;
 mod lanes;
 mod level;
@@ -12,6 +13,7 @@ mod scalar;
 #[cfg(target_arch = "x86_64")]
 mod x86;
 
+pub use barrier::branch_barrier;
 pub use dispatch::{Task, dispatch};
 pub use lanes::{Halves, Lanes, Simd};
 pub use level::SimdLevel;

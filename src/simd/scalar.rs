@@ -1,6 +1,6 @@
 use std::{
     array,
-    ops::{Add, Mul, Neg, Sub},
+    ops::{Add, Div, Mul, Neg, Sub},
 };
 
 use super::{Halves, Lanes, Simd, SimdLevel};
@@ -61,6 +61,14 @@ macro_rules! array_lanes {
             #[inline(always)]
             fn mul(self, other: Self) -> Self {
                 self.zip(other, |a, b| a * b)
+            }
+        }
+
+        impl<const N: usize> Div for Array<$elem, N> {
+            type Output = Self;
+            #[inline(always)]
+            fn div(self, other: Self) -> Self {
+                self.zip(other, |a, b| a / b)
             }
         }
 

@@ -4,7 +4,7 @@
 
 use std::{
     arch::x86_64::*,
-    ops::{Add, Mul, Neg, Sub},
+    ops::{Add, Div, Mul, Neg, Sub},
 };
 
 use super::{Halves, Lanes, Simd, SimdLevel};
@@ -69,7 +69,7 @@ macro_rules! compare {
 
 macro_rules! vector {
     ($name:ident($raw:ident), $elem:ident x $len:literal, compare $($compare:ident)+,
-     $set1:ident $load:ident $store:ident $add:ident $sub:ident $mul:ident $min:ident $max:ident
+     $set1:ident $load:ident $store:ident $add:ident $sub:ident $mul:ident $div:ident $min:ident $max:ident
      $fmadd:ident $fmsub:ident $xor:ident $andnot:ident) => {
         #[derive(Clone, Copy, Debug)]
         pub struct $name($raw);
@@ -95,6 +95,14 @@ macro_rules! vector {
             #[inline(always)]
             fn mul(self, other: Self) -> Self {
                 Self(call!($mul(self.0, other.0)))
+            }
+        }
+
+        impl Div for $name {
+            type Output = Self;
+            #[inline(always)]
+            fn div(self, other: Self) -> Self {
+                Self(call!($div(self.0, other.0)))
             }
         }
 
@@ -159,19 +167,19 @@ macro_rules! vector {
 }
 
 vector!(F32x4(__m128), f32 x 4, compare vector _mm_cmp_ps _mm_movemask_ps,
-    _mm_set1_ps _mm_loadu_ps _mm_storeu_ps _mm_add_ps _mm_sub_ps _mm_mul_ps _mm_min_ps _mm_max_ps
+    _mm_set1_ps _mm_loadu_ps _mm_storeu_ps _mm_add_ps _mm_sub_ps _mm_mul_ps _mm_div_ps _mm_min_ps _mm_max_ps
     _mm_fmadd_ps _mm_fmsub_ps _mm_xor_ps _mm_andnot_ps);
 vector!(F32x8(__m256), f32 x 8, compare vector _mm256_cmp_ps _mm256_movemask_ps,
-    _mm256_set1_ps _mm256_loadu_ps _mm256_storeu_ps _mm256_add_ps _mm256_sub_ps _mm256_mul_ps _mm256_min_ps
+    _mm256_set1_ps _mm256_loadu_ps _mm256_storeu_ps _mm256_add_ps _mm256_sub_ps _mm256_mul_ps _mm256_div_ps _mm256_min_ps
     _mm256_max_ps _mm256_fmadd_ps _mm256_fmsub_ps _mm256_xor_ps _mm256_andnot_ps);
 vector!(F64x4(__m256d), f64 x 4, compare vector _mm256_cmp_pd _mm256_movemask_pd,
-    _mm256_set1_pd _mm256_loadu_pd _mm256_storeu_pd _mm256_add_pd _mm256_sub_pd _mm256_mul_pd _mm256_min_pd
+    _mm256_set1_pd _mm256_loadu_pd _mm256_storeu_pd _mm256_add_pd _mm256_sub_pd _mm256_mul_pd _mm256_div_pd _mm256_min_pd
     _mm256_max_pd _mm256_fmadd_pd _mm256_fmsub_pd _mm256_xor_pd _mm256_andnot_pd);
 vector!(F32x16(__m512), f32 x 16, compare register _mm512_cmp_ps_mask,
-    _mm512_set1_ps _mm512_loadu_ps _mm512_storeu_ps _mm512_add_ps _mm512_sub_ps _mm512_mul_ps _mm512_min_ps
+    _mm512_set1_ps _mm512_loadu_ps _mm512_storeu_ps _mm512_add_ps _mm512_sub_ps _mm512_mul_ps _mm512_div_ps _mm512_min_ps
     _mm512_max_ps _mm512_fmadd_ps _mm512_fmsub_ps _mm512_xor_ps _mm512_andnot_ps);
 vector!(F64x8(__m512d), f64 x 8, compare register _mm512_cmp_pd_mask,
-    _mm512_set1_pd _mm512_loadu_pd _mm512_storeu_pd _mm512_add_pd _mm512_sub_pd _mm512_mul_pd _mm512_min_pd
+    _mm512_set1_pd _mm512_loadu_pd _mm512_storeu_pd _mm512_add_pd _mm512_sub_pd _mm512_mul_pd _mm512_div_pd _mm512_min_pd
     _mm512_max_pd _mm512_fmadd_pd _mm512_fmsub_pd _mm512_xor_pd _mm512_andnot_pd);
 
 /// Lane numbers for `vpermilps`.

@@ -1,3 +1,5 @@
+use std::ops::Range;
+
 use glam::Vec3;
 
 use crate::geom::Aabb;
@@ -43,14 +45,22 @@ impl Link {
         self.0 as usize
     }
 
-    /// Blocks of a leaf.
+    /// Blocks of a leaf, or of no child.
+    pub(super) fn blocks(self) -> Range<usize> {
+        if self == Self::NONE { 0..0 } else { self.leaf_blocks() }
+    }
+
+    /// Blocks of a leaf that has some.
     #[inline(always)]
-    pub(super) fn blocks(self) -> std::ops::Range<usize> {
-        if self == Self::NONE {
-            return 0..0;
-        }
+    pub(super) fn leaf_blocks(self) -> Range<usize> {
         let first = (self.0 & FIRST) as usize;
         first..first + ((self.0 & !LEAF) >> COUNT_SHIFT) as usize + 1
+    }
+
+    /// The link after its bits have passed through an identity.
+    #[inline(always)]
+    pub(super) fn map_bits(self, identity: impl Fn(u32) -> u32) -> Self {
+        Self(identity(self.0))
     }
 
     /// The link when what it names moves by that many pairs or blocks.

@@ -4,7 +4,7 @@ use super::{
 };
 use crate::{
     accel::{Closest, Counter, HitSink, TravRay, block::BlockRay, query::ORDINARY_MAX},
-    simd::{Halves, Lanes, Simd},
+    simd::{Halves, Lanes, Simd, branch_barrier},
 };
 
 /// Absolute slack of the f32 node test: above every underflow it may meet.
@@ -176,6 +176,13 @@ impl NodeTest for WideNode {
     }
 }
 
+/// The link, in a way that keeps the branch that led here: processors predict the child well, while choosing it by
+/// arithmetic would make each step wait for the box test of the one before.
+#[inline(always)]
+fn predicted(link: Link) -> Link {
+    link.map_bits(branch_barrier)
+}
+
 impl Bvh2 {
     /// True when f32 node tests are proven for this ray and these boxes.
     #[inline(always)]
@@ -246,7 +253,7 @@ impl Bvh2 {
         let mut link = Link::inner(0);
         loop {
             if link.is_leaf() {
-                for block in &self.blocks[link.blocks()] {
+                for block in &self.blocks[link.leaf_blocks()] {
                     block.closest(ray, &block_ray, best, sink, count);
                 }
                 test.limit(best);
@@ -254,14 +261,23 @@ impl Bvh2 {
                 count.node();
                 let pair = &self.pairs[link.pair()];
                 let (hits, entries) = test.test(pair);
+                let [first, second] = pair.links;
                 if hits == 3 {
-                    let far = usize::from(entries[0] <= entries[1]);
-                    stack.push(pair.links[far], entries[far]);
-                    link = pair.links[1 - far];
+                    if entries[0] <= entries[1] {
+                        stack.push(second, entries[1]);
+                        link = predicted(first);
+                    } else {
+                        stack.push(first, entries[0]);
+                        link = predicted(second);
+                    }
                     continue;
                 }
-                if hits != 0 {
-                    link = pair.links[(hits >> 1) as usize];
+                if hits == 1 {
+                    link = predicted(first);
+                    continue;
+                }
+                if hits == 2 {
+                    link = predicted(second);
                     continue;
                 }
             }
@@ -289,7 +305,7 @@ impl Bvh2 {
         let mut link = Link::inner(0);
         loop {
             if link.is_leaf() {
-                for block in &self.blocks[link.blocks()] {
+                for block in &self.blocks[link.leaf_blocks()] {
                     if block.occluded(ray, &block_ray, sink, count) {
                         return true;
                     }
@@ -298,14 +314,23 @@ impl Bvh2 {
                 count.node();
                 let pair = &self.pairs[link.pair()];
                 let (hits, entries) = test.test(pair);
+                let [first, second] = pair.links;
                 if hits == 3 {
-                    let far = usize::from(entries[0] <= entries[1]);
-                    stack.push(pair.links[far], ());
-                    link = pair.links[1 - far];
+                    if entries[0] <= entries[1] {
+                        stack.push(second, ());
+                        link = predicted(first);
+                    } else {
+                        stack.push(first, ());
+                        link = predicted(second);
+                    }
                     continue;
                 }
-                if hits != 0 {
-                    link = pair.links[(hits >> 1) as usize];
+                if hits == 1 {
+                    link = predicted(first);
+                    continue;
+                }
+                if hits == 2 {
+                    link = predicted(second);
                     continue;
                 }
             }

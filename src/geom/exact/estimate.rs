@@ -1,6 +1,6 @@
 use glam::{DVec3, Vec3};
 
-/// `16 * 2^-53`, the factor of every error bound of an [`Estimate`].
+/// `16 * 2^-53`, the factor of every error bound on volumes in f64.
 ///
 /// With ε = 2^-53, a difference of two f32 rounded to f64 has a relative error of at most ε (it cannot underflow).
 /// A term of D is then off by at most 7 ε of its size: three differences or exact factors, two products, one
@@ -14,21 +14,21 @@ pub const BOUND: f64 = 16.0 * (f64::EPSILON / 2.0);
 
 /// The four volumes in f64, each within its error of the exact value.
 #[derive(Clone, Copy, Debug)]
-pub struct Estimate {
+pub(super) struct Estimate {
     /// `D`.
-    pub det: f64,
+    pub(super) det: f64,
     /// `U`.
-    pub u: f64,
+    pub(super) u: f64,
     /// `V`.
-    pub v: f64,
+    pub(super) v: f64,
     /// `T`.
-    pub t: f64,
+    pub(super) t: f64,
     /// Bound on the error of `det`.
-    pub det_error: f64,
+    pub(super) det_error: f64,
     /// Bound on the errors of `u`, `v` and `det - u - v`.
-    pub uv_error: f64,
+    pub(super) uv_error: f64,
     /// Bound on the error of `t`.
-    pub t_error: f64,
+    pub(super) t_error: f64,
 }
 
 /// What an estimate says about a triangle.
@@ -75,15 +75,52 @@ impl Estimate {
         }
     }
 
-    /// The quotient of a volume and D with a bound on its error; needs `|det| >= 4 det_error`.
-    ///
-    /// Writing N, D for the exact volumes and n, d for the estimates, `|N/D - n/d| <= (|n - N| + |n/d| |d - D|) / |D|`
-    /// and `|D| >= 3/4 |d|`: the factor 2 in place of 4/3 and the last term cover the roundings here.
+    /// Bounds on t; needs `|det| >= 4 det_error`. See [`Quotients`].
     #[inline(always)]
-    pub(super) fn quotient(&self, volume: f64, error: f64) -> (f64, f64) {
-        let inv = 1.0 / self.det;
-        let q = volume * inv;
-        (q, 2.0 * (error + q.abs() * self.det_error) * inv.abs() + 4.0 * f64::EPSILON * q.abs())
+    pub(super) fn t_bounds(&self) -> (f64, f64) {
+        let (t, error) = self.quotients().bounded(self.t, self.t_error);
+        (t - error, t + error)
+    }
+
+    /// What u and v can be had from later.
+    #[inline(always)]
+    pub(super) fn quotients(&self) -> Quotients {
+        let Self { det, u, v, det_error, uv_error, .. } = *self;
+        Quotients { inv_det: 1.0 / det, u, v, det_error, uv_error }
+    }
+}
+
+/// Volumes of a triangle with `|det| >= 4 det_error`, ready to be divided.
+///
+/// Writing N, D for exact volumes and n, d for estimates, `|N/D - n/d| <= (|n - N| + |n/d| |d - D|) / |D|` and
+/// `|D| >= 3/4 |d|`. A bound of `2 (error + |q| det_error) |1/d| + 4 * 2^-52 |q|` with `q = n * (1/d)` has the factor 2 in
+/// place of 4/3 and the last term to cover the roundings of q, of the bound, and of the sum of both.
+#[derive(Clone, Copy, Debug)]
+pub struct Quotients {
+    /// `1 / D`.
+    pub inv_det: f64,
+    /// `U`.
+    pub u: f64,
+    /// `V`.
+    pub v: f64,
+    /// Bound on the error of `D`.
+    pub det_error: f64,
+    /// Bound on the errors of `U` and `V`.
+    pub uv_error: f64,
+}
+
+impl Quotients {
+    /// A volume over D, and a bound on its error.
+    #[inline(always)]
+    fn bounded(&self, volume: f64, error: f64) -> (f64, f64) {
+        let q = volume * self.inv_det;
+        (q, 2.0 * (error + q.abs() * self.det_error) * self.inv_det.abs() + 4.0 * f64::EPSILON * q.abs())
+    }
+
+    /// u and v, each with a bound on its error.
+    #[inline(always)]
+    pub(super) fn barycentric(&self) -> [(f64, f64); 2] {
+        [self.bounded(self.u, self.uv_error), self.bounded(self.v, self.uv_error)]
     }
 }
 

@@ -3,7 +3,7 @@ use std::cmp::Ordering;
 use glam::Vec3;
 
 use super::{
-    estimate::{Estimate, Verdict},
+    estimate::{Estimate, Quotients, Verdict},
     volumes::Volumes,
 };
 
@@ -23,10 +23,14 @@ pub struct RayRange {
 /// A triangle that a ray surely hits, with t, u and v known as closely as has been needed so far.
 #[derive(Clone, Copy, Debug)]
 pub struct TriangleHit {
-    corners: [Vec3; 3],
-    estimate: Estimate,
-    t_low: f64,
-    t_high: f64,
+    /// The corners it was tested with.
+    pub corners: [Vec3; 3],
+    /// At most the exact t.
+    pub t_low: f64,
+    /// At least the exact t.
+    pub t_high: f64,
+    /// Where u and v come from.
+    pub quotients: Quotients,
 }
 
 impl TriangleHit {
@@ -35,22 +39,18 @@ impl TriangleHit {
         let estimate = Estimate::new(ray.origin, ray.dir, &corners);
         match estimate.verdict() {
             Verdict::Miss => None,
-            Verdict::Meets => Self::from_sure(ray, corners, estimate),
+            Verdict::Meets => {
+                let hit = Self::from_estimate(corners, estimate);
+                let (near, far) = (f64::from(ray.t_near), f64::from(ray.t_far));
+                if hit.t_high < near || hit.t_low > far {
+                    None
+                } else if hit.t_low >= near && hit.t_high <= far {
+                    Some(hit)
+                } else {
+                    Self::exactly(ray, corners)
+                }
+            }
             Verdict::Doubt => Self::exactly(ray, corners),
-        }
-    }
-
-    /// As [`TriangleHit::test`] for a triangle whose estimate already shows that the line meets its inside and that
-    /// `|det| >= 4 det_error`.
-    #[inline(always)]
-    pub fn from_sure(ray: &RayRange, corners: [Vec3; 3], estimate: Estimate) -> Option<Self> {
-        let hit = Self::with_interval(corners, estimate);
-        if hit.t_high < f64::from(ray.t_near) || hit.t_low > f64::from(ray.t_far) {
-            None
-        } else if hit.t_low >= f64::from(ray.t_near) && hit.t_high <= f64::from(ray.t_far) {
-            Some(hit)
-        } else {
-            Self::exactly(ray, corners)
         }
     }
 
@@ -62,48 +62,28 @@ impl TriangleHit {
         let inside = volumes.meets()
             && volumes.cmp_t_to(ray.t_near) != Ordering::Less
             && volumes.cmp_t_to(ray.t_far) != Ordering::Greater;
-        inside.then(|| Self::with_interval(corners, volumes.estimate()))
+        inside.then(|| Self::from_estimate(corners, volumes.estimate()))
     }
 
     #[inline(always)]
-    fn with_interval(corners: [Vec3; 3], estimate: Estimate) -> Self {
-        let (t, error) = estimate.quotient(estimate.t, estimate.t_error);
-        Self { corners, estimate, t_low: t - error, t_high: t + error }
-    }
-
-    /// At most the exact t.
-    #[inline(always)]
-    pub fn t_low(&self) -> f64 {
-        self.t_low
-    }
-
-    /// At least the exact t.
-    #[inline(always)]
-    pub fn t_high(&self) -> f64 {
-        self.t_high
+    fn from_estimate(corners: [Vec3; 3], estimate: Estimate) -> Self {
+        let (t_low, t_high) = estimate.t_bounds();
+        Self { corners, t_low, t_high, quotients: estimate.quotients() }
     }
 
     /// Compares the exact t of two hits of the same ray.
-    #[inline(always)]
     pub fn cmp_t(&self, other: &Self, ray: &RayRange) -> Ordering {
         if self.t_high < other.t_low {
             Ordering::Less
         } else if self.t_low > other.t_high {
             Ordering::Greater
+        } else if self.corners == other.corners {
+            Ordering::Equal
         } else {
-            self.cmp_t_exactly(other, ray)
-        }
-    }
-
-    #[cold]
-    #[inline(never)]
-    fn cmp_t_exactly(&self, other: &Self, ray: &RayRange) -> Ordering {
-        if self.corners == other.corners {
-            return Ordering::Equal;
-        }
-        match (self.volumes(ray), other.volumes(ray)) {
-            (Some(a), Some(b)) => a.cmp_t(&b),
-            _ => Ordering::Equal,
+            match (self.volumes(ray), other.volumes(ray)) {
+                (Some(a), Some(b)) => a.cmp_t(&b),
+                _ => Ordering::Equal,
+            }
         }
     }
 
@@ -114,10 +94,8 @@ impl TriangleHit {
     /// The exact t, u, v, each rounded to the nearest f32.
     #[inline(always)]
     pub fn tuv(&self, ray: &RayRange) -> [f32; 3] {
-        let e = &self.estimate;
+        let [(u, u_error), (v, v_error)] = self.quotients.barycentric();
         let t = agreed(self.t_low, self.t_high);
-        let (u, u_error) = e.quotient(e.u, e.uv_error);
-        let (v, v_error) = e.quotient(e.v, e.uv_error);
         match (t, agreed(u - u_error, u + u_error), agreed(v - v_error, v + v_error)) {
             (Some(t), Some(u), Some(v)) => [t, u, v],
             _ => self.tuv_exactly(ray),

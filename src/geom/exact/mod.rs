@@ -18,5 +18,5 @@ mod hit;
 mod int;
 mod volumes;
 
-pub use estimate::{BOUND, Estimate};
+pub use estimate::{BOUND, Quotients};
 pub use hit::{RayRange, TriangleHit};
