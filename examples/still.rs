@@ -27,12 +27,14 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let clips = if clip.index() < scene.clips.len() { &clips[..] } else { &[] };
 
     let pool = Arc::new(rayon::ThreadPoolBuilder::new().num_threads(arg(8, "2").parse()?).build()?);
-    let config = FrameConfig { accel: "bvh2".into(), top: "bvh2".into(), policy: RebuildPolicy::Refit, pool: pool.clone() };
+    let config =
+        FrameConfig { accel: "bvh2".into(), top: "bvh2".into(), policy: RebuildPolicy::Refit, pool: pool.clone() };
     let mut frames = FrameLoop::new(config)?;
     frames.add(scene.clone(), DAffine3::IDENTITY);
     let (world, _) = frames.advance(&[clips])?;
     let moving: Vec<ClipId> = clips.iter().map(|c| c.clip).collect();
-    let file_camera = CameraView::nodes(&scene).first().and_then(|&n| CameraView::at_node(&scene, world.actor_pose(0), n));
+    let file_camera =
+        CameraView::nodes(&scene).first().and_then(|&n| CameraView::at_node(&scene, world.actor_pose(0), n));
     let camera = file_camera
         .unwrap_or_else(|| CameraView::framing(animation_bounds(&scene, &moving), width as f32 / height as f32));
     let prepare = Instant::now();

@@ -1,5 +1,7 @@
 //! Which hits count: culled back faces, holes of masked materials, layers already passed.
 
+use std::cell::Cell;
+
 use super::{
     context::{FrameContext, InstanceInfo},
     material::Coverage,
@@ -24,9 +26,13 @@ pub(crate) fn is_seen(ctx: &FrameContext<'_>, ray: &Ray, after: Option<LayerKey>
     }
     let info = ctx.info(hit.instance);
     let material = ctx.material(info);
-    if material.double_sided && material.coverage == Coverage::Opaque {
-        return true;
-    }
+    (material.double_sided && material.coverage == Coverage::Opaque) || is_seen_closer(ctx, ray, info, hit)
+}
+
+/// The part of [`is_seen`] that looks at the triangle.
+#[inline(never)]
+fn is_seen_closer(ctx: &FrameContext<'_>, ray: &Ray, info: &InstanceInfo, hit: &Hit) -> bool {
+    let material = ctx.material(info);
     let patch = Patch::new(ctx, info, hit);
     if !material.double_sided && (patch.cross.dot(ray.dir) > 0.0) != info.mirrored {
         return false;
@@ -41,8 +47,7 @@ pub(crate) fn is_seen(ctx: &FrameContext<'_>, ray: &Ray, after: Option<LayerKey>
 }
 
 /// Alpha of the surface at `patch`: factor, texture and vertex colour.
-#[inline(always)]
-pub(crate) fn alpha(ctx: &FrameContext<'_>, info: &InstanceInfo, patch: &Patch<'_>) -> f32 {
+fn alpha(ctx: &FrameContext<'_>, info: &InstanceInfo, patch: &Patch<'_>) -> f32 {
     let material = ctx.material(info);
     let mut alpha = material.base.w;
     if let Some(binding) = &material.base_map {
@@ -57,42 +62,89 @@ pub(crate) fn alpha(ctx: &FrameContext<'_>, info: &InstanceInfo, patch: &Patch<'
     alpha
 }
 
-/// True when `hit` counts for ambient occlusion: not in a hole and mostly there, read at the finest level.
-#[inline(always)]
-pub(crate) fn is_solid(ctx: &FrameContext<'_>, hit: &Hit) -> bool {
-    let info = ctx.info(hit.instance);
-    let least = match ctx.material(info).coverage {
-        Coverage::Opaque => return true,
-        Coverage::Mask(cutoff) => cutoff,
-        Coverage::Blend => 0.5,
-    };
-    alpha(ctx, info, &Patch::new(ctx, info, hit)) >= least
+/// Most blended layers that a secondary ray keeps; more are dark enough.
+const KEPT: usize = 16;
+
+/// Blended layers on a secondary ray's way: the nearest ones, in order.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Layers {
+    count: usize,
+    kept: [(LayerKey, f32); KEPT],
 }
 
-/// What a shadow ray finds on its way.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Blocking {
-    /// No light passes.
-    Whole,
-    /// A hole.
-    None,
-    /// A blended layer that stops this part of the light.
-    Part(f32),
+impl Layers {
+    /// Keeps a layer, once; the farthest falls off when there are too many.
+    fn add(&mut self, key: LayerKey, alpha: f32) {
+        let at = self.kept[..self.count].iter().take_while(|(k, _)| *k < key).count();
+        if at == KEPT || (at < self.count && self.kept[at].0 == key) {
+            return;
+        }
+        self.count = (self.count + 1).min(KEPT);
+        self.kept[at..self.count].rotate_right(1);
+        self.kept[at] = (key, alpha);
+    }
+
+    /// The part of the light that all layers together let through.
+    pub(crate) fn transmittance(&self) -> f32 {
+        self.kept[..self.count].iter().fold(1.0, |through, (_, alpha)| through * (1.0 - alpha))
+    }
 }
 
-/// How much of a light `hit` stops; `width` is the footprint's width in metres.
-#[inline(always)]
-pub(crate) fn blocking(ctx: &FrameContext<'_>, width: f32, hit: &Hit) -> Blocking {
-    let info = ctx.info(hit.instance);
-    match ctx.material(info).coverage {
-        Coverage::Opaque => Blocking::Whole,
-        Coverage::Mask(cutoff) => {
-            let patch = Patch::new(ctx, info, hit).with_width(width);
-            if alpha(ctx, info, &patch) >= cutoff { Blocking::Whole } else { Blocking::None }
+impl FrameContext<'_> {
+    /// True when `hit` stops a secondary ray; `width` is the footprint's width in metres. Blended layers let it pass
+    /// and are kept in `layers`.
+    #[inline(always)]
+    pub(crate) fn stops(&self, width: f32, hit: &Hit, layers: &Cell<Layers>) -> bool {
+        let info = self.info(hit.instance);
+        self.material(info).coverage == Coverage::Opaque || self.stops_partly(info, width, hit, layers)
+    }
+
+    #[inline(never)]
+    fn stops_partly(&self, info: &InstanceInfo, width: f32, hit: &Hit, layers: &Cell<Layers>) -> bool {
+        let alpha = alpha(self, info, &Patch::new(self, info, hit).with_width(width));
+        match self.material(info).coverage {
+            Coverage::Opaque => true,
+            Coverage::Mask(cutoff) => alpha >= cutoff,
+            Coverage::Blend => {
+                if alpha > 0.0 && alpha < 1.0 {
+                    let mut all = layers.get();
+                    all.add(layer_key(hit), alpha);
+                    layers.set(all);
+                }
+                alpha >= 1.0
+            }
         }
-        Coverage::Blend => {
-            let patch = Patch::new(ctx, info, hit).with_width(width);
-            Blocking::Part(alpha(ctx, info, &patch).clamp(0.0, 1.0))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn layers_multiply_in_order_whatever_the_order_they_come_in() {
+        let all: Vec<(LayerKey, f32)> =
+            (0..12u32).map(|i| ((1.0 + (i / 3) as f32, i % 3, i), 0.1 + 0.03 * i as f32)).collect();
+        let product = all.iter().fold(1.0f32, |p, (_, a)| p * (1.0 - a));
+        for turn in 0..12 {
+            let mut layers = Layers::default();
+            for i in 0..12 {
+                let (key, alpha) = all[(i * 5 + turn) % 12];
+                layers.add(key, alpha);
+                layers.add(key, alpha);
+            }
+            assert_eq!(layers.transmittance(), product);
         }
+    }
+
+    #[test]
+    fn the_nearest_layers_are_kept_when_there_are_many() {
+        let (mut up, mut down) = (Layers::default(), Layers::default());
+        for i in 0..40u32 {
+            up.add((i as f32, 0, 0), 0.5);
+            down.add(((39 - i) as f32, 0, 0), 0.5);
+        }
+        assert_eq!(up.kept.map(|k| k.0.0), std::array::from_fn(|i| i as f32));
+        assert_eq!(down.kept.map(|k| k.0.0), up.kept.map(|k| k.0.0));
     }
 }

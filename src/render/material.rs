@@ -31,7 +31,6 @@ impl Binding {
     }
 
     /// The filtered texel at file coordinates `uv`.
-    #[inline(always)]
     pub(crate) fn read(&self, pyramids: &[Pyramid], uv: Vec2, footprint: &Footprint) -> Vec4 {
         let footprint = Footprint { dx: self.turn(footprint.dx), dy: self.turn(footprint.dy) };
         sample(&pyramids[self.pyramid as usize], &self.sampler, self.place(uv), &footprint)

@@ -1,5 +1,6 @@
 //! Camera rays, shading, film. Reads a finished world; never builds one.
 
+mod block;
 mod brdf;
 mod camera;
 mod context;

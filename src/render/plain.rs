@@ -4,37 +4,66 @@ use glam::Vec3;
 
 use super::{
     Shading,
+    block::Probe,
     context::FrameContext,
     math::{disc, frame},
     pattern::PixelSampler,
     surface::{Patch, Surface},
 };
-use crate::{
-    geom::{Hit, Ray},
-    simd::Simd,
-};
+use crate::geom::{Hit, Ray};
 
 /// Occlusion rays a sample.
 const AO_RAYS: u32 = 4;
+/// Reflectance of the eyelight's clay.
+const CLAY: Vec3 = Vec3::new(0.86, 0.84, 0.80);
 /// Purpose number of the pattern over the hemisphere.
 const AO_PATTERN: u32 = 0;
 
-/// The display colour at `hit` and the number of further rays it took.
-#[inline(always)]
-pub(crate) fn color<S: Simd>(ctx: &FrameContext<'_>, ray: &Ray, hit: &Hit, random: &PixelSampler) -> (Vec3, u64) {
-    if ctx.settings.shading == Shading::Depth {
-        return (Vec3::splat(depth(ctx.depth_range, hit.t)), 0);
+/// A point without material: its display colour, and what occlusion rays start from.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct PlainPoint {
+    pub(crate) color: Vec3,
+    surface: Option<Surface>,
+}
+
+impl PlainPoint {
+    /// Secondary rays a point of a shading.
+    pub(crate) fn probe_count(shading: Shading) -> usize {
+        if shading == Shading::Ao { AO_RAYS as usize } else { 0 }
     }
-    let info = ctx.info(hit.instance);
-    let mut patch = Patch::new(ctx, info, hit);
-    if ctx.material(info).normal_map.is_some() {
-        patch = patch.with_steps(ctx, ray, hit.t);
+
+    /// What `ray` sees at `hit`; ambient occlusion begins black.
+    pub(crate) fn new(ctx: &FrameContext<'_>, ray: &Ray, hit: &Hit) -> Self {
+        if ctx.settings.shading == Shading::Depth {
+            return Self { color: Vec3::splat(depth(ctx.depth_range, hit.t)), surface: None };
+        }
+        let info = ctx.info(hit.instance);
+        let mut patch = Patch::new(ctx, info, hit);
+        if ctx.material(info).normal_map.is_some() {
+            patch = patch.with_steps(ctx, ray, hit.t);
+        }
+        let surface = Surface::new(ctx, info, &patch, ray, hit);
+        let color = match ctx.settings.shading {
+            Shading::Normals => encoded_normal(surface.n_shade),
+            Shading::Ao => Vec3::ZERO,
+            _ => CLAY * surface.n_shade.dot(surface.view).clamp(0.0, 1.0),
+        };
+        Self { color, surface: Some(surface) }
     }
-    let surface = Surface::new(ctx, info, &patch, ray, hit);
-    match ctx.settings.shading {
-        Shading::Normals => (encoded_normal(surface.n_shade), 0),
-        Shading::Ao => (Vec3::splat(openness::<S>(ctx, &surface, random)), u64::from(AO_RAYS)),
-        _ => (Vec3::new(0.86, 0.84, 0.80) * surface.n_shade.dot(surface.view).clamp(0.0, 1.0), 0),
+
+    /// Occlusion ray `number`, drawn from the cosine-weighted hemisphere within the context's reach.
+    pub(crate) fn probe(&self, ctx: &FrameContext<'_>, number: usize, random: &PixelSampler) -> Option<Probe> {
+        let surface = self.surface.as_ref()?;
+        let n = surface.n_shade;
+        let (a, b) = frame(n);
+        #[expect(clippy::cast_possible_truncation, reason = "a handful of rays")]
+        let (u, v) = random.square(AO_PATTERN, number as u32, AO_RAYS);
+        let (x, y) = disc(u, v);
+        let mut dir = a * x + b * y + n * (1.0 - x * x - y * y).max(0.0).sqrt();
+        // Directions below the facet are mirrored to its upper side.
+        dir -= surface.n_geom * (2.0 * dir.dot(surface.n_geom).min(0.0));
+        let ray = Ray { origin: surface.origin(dir), dir, t_near: 0.0, t_far: ctx.reach };
+        Some(Probe { ray, light: Vec3::splat(1.0 / AO_RAYS as f32), width: 0.0 })
     }
 }
 
@@ -51,25 +80,6 @@ fn depth([near, far]: [f32; 2], t: f32) -> f32 {
     let part = ((t - near) / (far - near)).clamp(0.0, 1.0);
     // NaN when the scene has no depth at all.
     if part >= 0.0 { 1.0 - 0.96 * part } else { 1.0 }
-}
-
-/// Part of the cosine-weighted hemisphere that is open within the context's reach.
-#[inline(always)]
-fn openness<S: Simd>(ctx: &FrameContext<'_>, surface: &Surface, random: &PixelSampler) -> f32 {
-    let n = surface.n_shade;
-    let (a, b) = frame(n);
-    let mut open = 0u32;
-    for i in 0..AO_RAYS {
-        let (u, v) = random.square(AO_PATTERN, i, AO_RAYS);
-        let (x, y) = disc(u, v);
-        let mut dir = a * x + b * y + n * (1.0 - x * x - y * y).max(0.0).sqrt();
-        // Directions below the facet are mirrored to its upper side.
-        dir -= surface.n_geom * (2.0 * dir.dot(surface.n_geom).min(0.0));
-        let ray = Ray { origin: surface.origin(dir), dir, t_near: 0.0, t_far: ctx.reach };
-        let solid = |hit: &Hit| super::filter::is_solid(ctx, hit);
-        open += u32::from(!ctx.world.is_occluded::<S, _>(&ray, &solid));
-    }
-    open as f32 / AO_RAYS as f32
 }
 
 #[cfg(test)]

@@ -127,7 +127,6 @@ pub(crate) struct Surface {
 
 impl Surface {
     /// The surface of `patch`, where `ray` met it.
-    #[inline(always)]
     pub(crate) fn new(ctx: &FrameContext<'_>, info: &InstanceInfo, patch: &Patch<'_>, ray: &Ray, hit: &Hit) -> Self {
         let view = unit_or(-ray.dir, Vec3::Z);
         let [w, u, v] = patch.weights;
@@ -214,7 +213,6 @@ fn towards_viewer(n: Vec3, view: Vec3) -> Vec3 {
 }
 
 /// The normal map's normal around `smooth`, on the side of the file's winding, and the length of the filtered vector.
-#[inline(always)]
 fn mapped_normal(
     ctx: &FrameContext<'_>,
     info: &InstanceInfo,
@@ -235,7 +233,6 @@ fn mapped_normal(
 }
 
 /// Unit tangent and bitangent perpendicular to `smooth`: the file's, else from the texture coordinates.
-#[inline(always)]
 fn tangent_frame(
     ctx: &FrameContext<'_>,
     info: &InstanceInfo,

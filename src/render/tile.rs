@@ -5,25 +5,15 @@ use std::ops::Range;
 use glam::Vec3;
 
 use super::{
+    block::{Block, SIDE, lane},
     context::FrameContext,
-    filter::{LayerKey, is_seen, layer_key},
-    pattern::{PixelSampler, subpixel},
-    plain,
-    shade::ShadePoint,
     sky::backdrop,
     tone::filmic,
 };
-use crate::{
-    geom::{Hit, Ray},
-    simd::{Simd, Task},
-};
+use crate::simd::{Simd, Task};
 
 /// Rows of a band.
 pub(crate) const BAND_ROWS: usize = 8;
-/// Most blended layers of a pixel.
-const LAYERS: usize = 32;
-/// Light that still passes below which further layers are not looked for.
-const OPAQUE: f32 = 1.0 / 512.0;
 
 /// Rows of a picture with their place.
 #[derive(Debug)]
@@ -39,31 +29,6 @@ pub(crate) struct Band<'a> {
 pub(crate) struct BandTask<'a, 'b> {
     pub(crate) ctx: &'b FrameContext<'a>,
     pub(crate) band: Band<'b>,
-}
-
-/// Pixels a side of a block: the rays that are traced together.
-const SIDE: u32 = 4;
-const LANES: usize = (SIDE * SIDE) as usize;
-
-/// What the samples of one pixel have found so far.
-#[derive(Clone, Copy)]
-struct Pixel {
-    color: Vec3,
-    coverage: f32,
-    depth: f32,
-    instance: u32,
-}
-
-impl Pixel {
-    const EMPTY: Self = Self { color: Vec3::ZERO, coverage: 0.0, depth: f32::INFINITY, instance: 0 };
-
-    /// Adds one sample's first surface.
-    #[inline(always)]
-    fn add_surface(&mut self, hit: &Hit) {
-        if hit.t < self.depth {
-            (self.depth, self.instance) = (hit.t, hit.instance.0 + 1);
-        }
-    }
 }
 
 impl Task for BandTask<'_, '_> {
@@ -115,17 +80,22 @@ impl BandTask<'_, '_> {
     #[inline(always)]
     fn block<S: Simd>(&mut self, left: u32, top: u32, columns: Range<u32>, rows: Range<u32>) -> u64 {
         let ctx = self.ctx;
-        let mut pixels = [Pixel::EMPTY; LANES];
-        let mut rays = 0;
+        let mut block = Block::new(left, top, &columns, &rows);
         let settings = &ctx.settings;
         for sample in (0..settings.samples).map(|s| settings.first_sample.wrapping_add(s)) {
-            rays += sample_block::<S>(ctx, [left, top], &columns, &rows, sample, &mut pixels);
+            block.add_sample::<S>(ctx, sample);
         }
-        let scale = 1.0 / settings.samples as f32;
-        for y in rows {
-            let behind = background(ctx, y);
+        self.store(&block, columns, &rows);
+        block.rays
+    }
+
+    /// Writes a block's pixels over the background.
+    fn store(&mut self, block: &Block, columns: Range<u32>, rows: &Range<u32>) {
+        let scale = 1.0 / self.ctx.settings.samples as f32;
+        for y in rows.clone() {
+            let behind = background(self.ctx, y);
             for x in columns.clone() {
-                let pixel = &pixels[lane(x - left, y - top)];
+                let pixel = &block.pixels[lane(x - block.left, y - block.top)];
                 if pixel.instance != 0 {
                     let at = self.at(x, y);
                     let coverage = pixel.coverage * scale;
@@ -136,69 +106,7 @@ impl BandTask<'_, '_> {
                 }
             }
         }
-        rays
     }
-}
-
-#[inline(always)]
-fn lane(x: u32, y: u32) -> usize {
-    (y * SIDE + x) as usize
-}
-
-/// Adds one sample of each pixel of a block; returns the number of rays.
-#[inline(always)]
-fn sample_block<S: Simd>(
-    ctx: &FrameContext<'_>,
-    [left, top]: [u32; 2],
-    columns: &Range<u32>,
-    rows: &Range<u32>,
-    sample: u32,
-    pixels: &mut [Pixel; LANES],
-) -> u64 {
-    let (jitter_x, jitter_y) = subpixel(sample);
-    let mut count = 0;
-    for y in rows.clone() {
-        for x in columns.clone() {
-            let ray = ctx.rays.ray(x as f32 + jitter_x, y as f32 + jitter_y);
-            let pixel = &mut pixels[lane(x - left, y - top)];
-            let random = PixelSampler::new(ctx.settings.seed, ctx.settings.frame, y * ctx.size[0] + x, sample);
-            count += shade_ray::<S>(ctx, &ray, &random, pixel);
-        }
-    }
-    count
-}
-
-/// Adds what one camera ray sees: layers front to back until one is opaque.
-#[inline(always)]
-fn shade_ray<S: Simd>(ctx: &FrameContext<'_>, ray: &Ray, random: &PixelSampler, pixel: &mut Pixel) -> u64 {
-    let lit = ctx.settings.shading.is_lit();
-    let (mut rays, mut through, mut after, mut rest) = (0, 1.0, None::<LayerKey>, *ray);
-    for _ in 0..LAYERS {
-        rays += 1;
-        let seen = |hit: &Hit| is_seen(ctx, ray, after, hit);
-        let Some(hit) = ctx.world.closest_hit::<S, _>(&rest, &seen) else { break };
-        if after.is_none() {
-            pixel.add_surface(&hit);
-        }
-        let (color, alpha) = if lit {
-            let mut point = ShadePoint::new(ctx, ray, &hit);
-            rays += point.add_lights::<S>(ctx, random);
-            (point.color, point.alpha)
-        } else {
-            let (color, cast) = plain::color::<S>(ctx, ray, &hit, random);
-            rays += cast;
-            (color, 1.0)
-        };
-        pixel.color += color * (alpha * through);
-        pixel.coverage += alpha * through;
-        through *= 1.0 - alpha;
-        if through < OPAQUE {
-            break;
-        }
-        // Sure to find the next layer: the range is closed and keys past the last are refused.
-        (after, rest.t_near) = (Some(layer_key(&hit)), hit.t);
-    }
-    rays
 }
 
 /// Colour behind everything in row `y`.

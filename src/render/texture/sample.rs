@@ -2,7 +2,7 @@ use glam::{Vec2, Vec4};
 
 use super::Pyramid;
 use crate::{
-    render::math::log2,
+    render::math::{floor, log2},
     scene::{Filter, TexSampler, Wrap},
 };
 
@@ -47,7 +47,6 @@ impl Plan {
 }
 
 /// The texture's linear RGBA at `uv` (v down), filtered over `footprint` as `sampler` says. Any float is taken.
-#[inline(always)]
 pub(crate) fn sample(pyramid: &Pyramid, sampler: &TexSampler, uv: Vec2, footprint: &Footprint) -> Vec4 {
     if pyramid.level_count() == 1 && pyramid.level(0).width == 1 && pyramid.level(0).height == 1 {
         return pyramid.texel(0, 0, 0);
@@ -65,17 +64,16 @@ pub(crate) fn sample(pyramid: &Pyramid, sampler: &TexSampler, uv: Vec2, footprin
 }
 
 /// Minified look-up at level of detail `lod`.
-#[inline(always)]
 fn between_levels(pyramid: &Pyramid, sampler: &TexSampler, lod: f32, uv: Vec2) -> Vec4 {
     let last = pyramid.level_count() - 1;
     let lod = lod.min(last as f32);
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "between 0 and the last level")]
-    let floor = |x: f32| x as usize;
+    let level_of = |x: f32| x as usize;
     match sampler.mip {
         None => at_level(pyramid, sampler, sampler.min, 0, uv),
-        Some(Filter::Nearest) => at_level(pyramid, sampler, sampler.min, floor(lod + 0.5).min(last), uv),
+        Some(Filter::Nearest) => at_level(pyramid, sampler, sampler.min, level_of(lod + 0.5).min(last), uv),
         Some(Filter::Linear) => {
-            let level = floor(lod);
+            let level = level_of(lod);
             let fine = at_level(pyramid, sampler, sampler.min, level, uv);
             let part = lod - level as f32;
             if part == 0.0 {
@@ -88,7 +86,6 @@ fn between_levels(pyramid: &Pyramid, sampler: &TexSampler, lod: f32, uv: Vec2) -
 }
 
 /// Look-up in one level.
-#[inline(always)]
 fn at_level(pyramid: &Pyramid, sampler: &TexSampler, filter: Filter, level: usize, uv: Vec2) -> Vec4 {
     let size = pyramid.level(level);
     let (u, v) = (fold(uv.x, sampler.wrap_u), fold(uv.y, sampler.wrap_v));
@@ -113,9 +110,9 @@ fn at_level(pyramid: &Pyramid, sampler: &TexSampler, filter: Filter, level: usiz
 fn fold(x: f32, wrap: Wrap) -> f32 {
     let folded = match wrap {
         Wrap::Clamp => x,
-        Wrap::Repeat => x - x.floor(),
+        Wrap::Repeat => x - floor(x),
         Wrap::Mirror => {
-            let two = x - 2.0 * (x * 0.5).floor();
+            let two = x - 2.0 * floor(x * 0.5);
             if two > 1.0 { 2.0 - two } else { two }
         }
     };
@@ -126,21 +123,21 @@ fn fold(x: f32, wrap: Wrap) -> f32 {
 #[inline(always)]
 fn pair(x: f32, size: u32, wrap: Wrap) -> (u32, u32, f32) {
     let centred = x - 0.5;
-    let floor = centred.floor();
-    let (first, last) = (whole(floor), i64::from(size) - 1);
+    let below = floor(centred);
+    let (first, last) = (whole(below), i64::from(size) - 1);
     let wrapped = |i: i64| match wrap {
         Wrap::Repeat if i < 0 => last,
         Wrap::Repeat if i > last => 0,
         // A mirrored neighbour of an edge texel is the edge texel itself.
         _ => i.clamp(0, last),
     };
-    (low(wrapped(first).unsigned_abs()), low(wrapped(first + 1).unsigned_abs()), centred - floor)
+    (low(wrapped(first).unsigned_abs()), low(wrapped(first + 1).unsigned_abs()), centred - below)
 }
 
 #[inline(always)]
 fn whole(x: f32) -> i64 {
     #[expect(clippy::cast_possible_truncation, reason = "at most the texture's size")]
-    let i = x.floor() as i64;
+    let i = floor(x) as i64;
     i
 }
 
