@@ -57,13 +57,16 @@ fn textures() -> Stage {
     ];
     for (i, (wrap, mag)) in modes.into_iter().enumerate() {
         let sampler = TexSampler { mag, min: mag, mip: Some(Filter::Linear), wrap_u: wrap, wrap_v: wrap };
-        let mut map = stage.texture(sampler, 8, |x, y| [(x * 36) as u8, (y * 36) as u8, if x > y { 200 } else { 40 }, 255]);
+        let mut map =
+            stage.texture(sampler, 8, |x, y| [(x * 36) as u8, (y * 36) as u8, if x > y { 200 } else { 40 }, 255]);
         (map.scale, map.offset) = (Vec2::splat(1.7), Vec2::new(-0.3, 0.2));
         map.rotation = if i == 3 { 0.6 } else { 0.0 };
         let material = Material { base_color_texture: Some(map), ..unlit(Vec4::ONE, AlphaMode::Opaque) };
         stage.part(square(0.5), material, at(i as f64 * 1.1 - 1.65, 0.6, 0.0));
     }
-    let checks = stage.texture(TexSampler::default(), 32, |x, y| if (x / 4 + y / 4) % 2 == 0 { [240, 240, 240, 255] } else { [20, 20, 30, 255] });
+    let checks = stage.texture(TexSampler::default(), 32, |x, y| {
+        if (x / 4 + y / 4) % 2 == 0 { [240, 240, 240, 255] } else { [20, 20, 30, 255] }
+    });
     let mut part = floor(6.0);
     part.tex_coords[0].iter_mut().for_each(|uv| *uv *= 12.0);
     stage.part(part, Material { base_color_texture: Some(checks), ..matte(Vec3::ONE) }, at(0.0, -0.8, -3.0));
@@ -85,10 +88,21 @@ fn alpha() -> Stage {
         ..matte(Vec3::ONE)
     };
     stage.part(ball(0.7, 24, 12), holes, at(-0.9, -0.1, 0.0));
-    for (i, color) in [Vec3::new(0.9, 0.2, 0.2), Vec3::new(0.2, 0.9, 0.3), Vec3::new(0.2, 0.3, 0.9)].into_iter().enumerate() {
-        let glass = Material { base_color: color.extend(0.45), alpha_mode: AlphaMode::Blend, double_sided: true, ..matte(color) };
+    for (i, color) in
+        [Vec3::new(0.9, 0.2, 0.2), Vec3::new(0.2, 0.9, 0.3), Vec3::new(0.2, 0.3, 0.9)].into_iter().enumerate()
+    {
+        let glass = Material {
+            base_color: color.extend(0.45),
+            alpha_mode: AlphaMode::Blend,
+            double_sided: true,
+            ..matte(color)
+        };
         let glass = Material { base_color: color.extend(0.45), ..glass };
-        stage.part(square(0.5), glass, turned(DVec3::Y, 25.0, at(0.5 + 0.35 * i as f64, 0.1 * i as f64, 0.7 - 0.4 * i as f64)));
+        stage.part(
+            square(0.5),
+            glass,
+            turned(DVec3::Y, 25.0, at(0.5 + 0.35 * i as f64, 0.1 * i as f64, 0.7 - 0.4 * i as f64)),
+        );
     }
     stage
 }
@@ -117,10 +131,15 @@ fn lamps() -> Stage {
 fn colours() -> Stage {
     let mut stage = Stage::default();
     let mut part = square(0.5);
-    part.colors = vec![Vec4::new(1.0, 0.0, 0.0, 1.0), Vec4::new(0.0, 1.0, 0.0, 1.0), Vec4::new(0.0, 0.0, 1.0, 1.0), Vec4::ONE];
+    part.colors =
+        vec![Vec4::new(1.0, 0.0, 0.0, 1.0), Vec4::new(0.0, 1.0, 0.0, 1.0), Vec4::new(0.0, 0.0, 1.0, 1.0), Vec4::ONE];
     stage.part(part.clone(), unlit(Vec4::ONE, AlphaMode::Opaque), at(-1.2, 0.0, 0.0));
     stage.part(part, matte(Vec3::ONE), at(0.0, 0.0, 0.0));
-    stage.part(square(0.5), Material { emissive: Vec3::new(4.0, 1.0, 0.2), ..matte(Vec3::splat(0.1)) }, at(1.2, 0.0, 0.0));
+    stage.part(
+        square(0.5),
+        Material { emissive: Vec3::new(4.0, 1.0, 0.2), ..matte(Vec3::splat(0.1)) },
+        at(1.2, 0.0, 0.0),
+    );
     let mut flat = ball(0.4, 10, 6);
     flat.normals.clear();
     stage.part(flat, matte(Vec3::new(0.3, 0.6, 0.9)), at(0.0, 0.9, 0.0));
@@ -129,8 +148,13 @@ fn colours() -> Stage {
 
 fn cases() -> Vec<Case> {
     let mut all = Vec::new();
-    let lit: [(&str, Stage); 5] =
-        [("spheres", spheres()), ("textures", textures()), ("alpha", alpha()), ("lamps", lamps()), ("colours", colours())];
+    let lit: [(&str, Stage); 5] = [
+        ("spheres", spheres()),
+        ("textures", textures()),
+        ("alpha", alpha()),
+        ("lamps", lamps()),
+        ("colours", colours()),
+    ];
     for (name, stage) in lit {
         all.push(Case { name, world: stage.world(), shading: Shading::Direct, samples: 4 });
     }

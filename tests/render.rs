@@ -28,12 +28,21 @@ fn fair(accel: &str) -> Arc<World> {
     let checks = stage.texture(TexSampler::default(), 16, |x, y| {
         if (x / 2 + y / 2) % 2 == 0 { [230, 120, 40, 255] } else { [30, 60, 160, 90] }
     });
-    stage.part(floor(4.0), Material { base_color_texture: Some(checks), metallic: 0.0, ..Material::default() }, at(0.0, -1.0, 0.0));
+    stage.part(
+        floor(4.0),
+        Material { base_color_texture: Some(checks), metallic: 0.0, ..Material::default() },
+        at(0.0, -1.0, 0.0),
+    );
     stage.part(ball(0.7, 24, 12), Material { roughness: 0.3, ..Material::default() }, at(-1.0, -0.3, 0.0));
     let mask = AlphaMode::Mask { cutoff: 0.5 };
     let holes = Material { base_color_texture: Some(checks), alpha_mode: mask, double_sided: true, ..matte(Vec3::ONE) };
     stage.part(ball(0.6, 16, 8), holes, at(0.8, -0.2, 0.3));
-    let pane = Material { base_color: Vec4::new(0.2, 0.9, 0.4, 0.4), alpha_mode: AlphaMode::Blend, double_sided: true, ..Material::default() };
+    let pane = Material {
+        base_color: Vec4::new(0.2, 0.9, 0.4, 0.4),
+        alpha_mode: AlphaMode::Blend,
+        double_sided: true,
+        ..Material::default()
+    };
     stage.part(square(0.8), pane, turned(DVec3::Y, 20.0, at(0.1, 0.0, 1.2)));
     stage.light(LightKind::Point, Vec3::new(1.0, 0.9, 0.8), 40.0, at(2.0, 3.0, 2.0));
     stage.light(LightKind::Directional, Vec3::new(0.5, 0.7, 1.0), 2.0, turned(DVec3::X, -50.0, Trs::IDENTITY));
@@ -164,7 +173,8 @@ fn layers_blend_in_order_of_distance_whatever_their_numbers() {
         stage.part(square(2.0), unlit(color.truncate().extend(1.0), AlphaMode::Opaque), at(0.0, 0.0, 0.0));
         Vec4::from(pixel(&shoot(&stage.world(), &front(3.0), &RenderSettings::default(), 8, 8), 4, 4)).truncate()
     };
-    let behind = Vec4::from(pixel(&shoot(&Stage::default().world(), &front(3.0), &RenderSettings::default(), 8, 8), 4, 4));
+    let behind =
+        Vec4::from(pixel(&shoot(&Stage::default().world(), &front(3.0), &RenderSettings::default(), 8, 8), 4, 4));
     let mut want = behind.truncate();
     for color in colors {
         want = alone(color) * color.w + want * (1.0 - color.w);
@@ -269,7 +279,11 @@ fn a_floor_shadows_itself_at_no_scale() {
                         let n = (Vec3::new(0.0, 2.0, 3.5) + dir * (film.depth[at] / scale)).normalize();
                         if n.dot(light) > 0.3 {
                             seen += 1;
-                            assert!(film.color[at][1] > 0.25, "dark speck at {x}, {y}, scale {scale}: {:?}", film.color[at]);
+                            assert!(
+                                film.color[at][1] > 0.25,
+                                "dark speck at {x}, {y}, scale {scale}: {:?}",
+                                film.color[at]
+                            );
                         }
                     }
                 }
@@ -283,7 +297,14 @@ fn a_floor_shadows_itself_at_no_scale() {
 fn no_light_leaks_into_a_closed_box() {
     let inside = |intensity: f32| {
         let mut stage = Stage::default();
-        for (axis, degrees) in [(DVec3::Y, 0.0), (DVec3::Y, 90.0), (DVec3::Y, 180.0), (DVec3::Y, 270.0), (DVec3::X, 90.0), (DVec3::X, -90.0)] {
+        for (axis, degrees) in [
+            (DVec3::Y, 0.0),
+            (DVec3::Y, 90.0),
+            (DVec3::Y, 180.0),
+            (DVec3::Y, 270.0),
+            (DVec3::X, 90.0),
+            (DVec3::X, -90.0),
+        ] {
             let turn = turned(axis, degrees, Trs::IDENTITY);
             let place = Trs { translation: turn.rotation * DVec3::new(0.0, 0.0, -1.0), ..turn };
             stage.part(square(1.0), matte(Vec3::splat(0.8)), place);
@@ -336,7 +357,8 @@ fn emission_adds_and_normals_show_as_codes() {
     let world = stage.world();
     let lit = pixel(&shoot(&world, &front(3.0), &RenderSettings::default(), 4, 4), 2, 2);
     assert!(lit[1] > lit[0] + 1.9 && lit[1] < lit[0] + 2.1, "{lit:?}");
-    let normals = shoot(&world, &front(3.0), &RenderSettings { shading: Shading::Normals, ..RenderSettings::default() }, 4, 4);
+    let normals =
+        shoot(&world, &front(3.0), &RenderSettings { shading: Shading::Normals, ..RenderSettings::default() }, 4, 4);
     let mut bytes = Vec::new();
     normals.to_srgb8(&mut bytes);
     assert_eq!(bytes[..4], [128, 128, 255, 255]);
@@ -359,12 +381,17 @@ fn an_open_plane_is_unoccluded_and_a_corner_is_not() {
 #[test]
 fn distant_checks_become_their_mean() {
     let mut stage = Stage::default();
-    let checks = stage.texture(TexSampler::default(), 64, |x, y| if (x + y) % 2 == 0 { [255; 4] } else { [0, 0, 0, 255] });
+    let checks =
+        stage.texture(TexSampler::default(), 64, |x, y| if (x + y) % 2 == 0 { [255; 4] } else { [0, 0, 0, 255] });
     let mut part = floor(400.0);
     for uv in &mut part.tex_coords[0] {
         *uv *= Vec2::splat(200.0);
     }
-    stage.part(part, Material { base_color_texture: Some(checks), ..unlit(Vec4::ONE, AlphaMode::Opaque) }, at(0.0, 0.0, 0.0));
+    stage.part(
+        part,
+        Material { base_color_texture: Some(checks), ..unlit(Vec4::ONE, AlphaMode::Opaque) },
+        at(0.0, 0.0, 0.0),
+    );
     let world = stage.world();
     let row = |shift: f32| {
         let camera = CameraView::look_at(Vec3::new(shift, 2.0, 0.0), Vec3::new(shift, 0.0, -20.0), Vec3::Y, 0.7);

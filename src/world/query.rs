@@ -42,23 +42,24 @@ impl World {
     fn closest<S: Simd, F: Filter>(&self, ray: &Ray, filter: F) -> Option<Hit> {
         let trav = TravRay::new(ray)?;
         let mut best = Closest::new(&trav);
-        self.top.visit(&self.groups, &trav, |group| {
+        let mut walk = self.top.walk(&self.groups, &trav);
+        while let Some(group) = walk.next(best.t_high()) {
             let sink = GroupSink { layout: &group.layout, filter };
             group.accel.closest::<S, (), _>(&group.triangles(), &trav, &mut best, &sink, &mut ());
-            best.t_high()
-        });
+        }
         best.hit(&trav)
     }
 
     #[inline(always)]
     fn occluded<S: Simd, F: Filter>(&self, ray: &Ray, filter: F) -> bool {
         let Some(trav) = TravRay::new(ray) else { return false };
-        let mut occluded = false;
-        self.top.visit(&self.groups, &trav, |group| {
+        let mut walk = self.top.walk(&self.groups, &trav);
+        while let Some(group) = walk.next(f64::from(trav.range().t_far)) {
             let sink = GroupSink { layout: &group.layout, filter };
-            occluded = group.accel.occluded::<S, (), _>(&group.triangles(), &trav, &sink, &mut ());
-            if occluded { f64::NEG_INFINITY } else { f64::from(trav.range().t_far) }
-        });
-        occluded
+            if group.accel.occluded::<S, (), _>(&group.triangles(), &trav, &sink, &mut ()) {
+                return true;
+            }
+        }
+        false
     }
 }

@@ -4,7 +4,11 @@
 
 use std::str::FromStr;
 
-use super::{group::GroupFrame, slab::SlabRay, top_tree::TopTree};
+use super::{
+    group::GroupFrame,
+    slab::SlabRay,
+    top_tree::{TopTree, TreeWalk},
+};
 use crate::accel::{SpecError, TravRay};
 
 /// Up to this many groups are tested one by one and sorted by entry: a tree over so few costs more than it saves.
@@ -60,57 +64,103 @@ impl Top {
         }
     }
 
-    /// Calls `visit` with each group that `ray` may hit before the bound that the last call returned
-    /// (at first `t_far`); a bound of negative infinity ends the walk.
+    /// The groups that `ray` may hit, nearest first as far as the kind orders them.
     #[inline(always)]
-    pub(crate) fn visit(&self, groups: &[GroupFrame], ray: &TravRay, mut visit: impl FnMut(&GroupFrame) -> f64) {
-        match groups {
-            [] => {}
-            [group] => {
-                visit(group);
-            }
-            _ if self.kind == TopKind::List => visit_in_order(groups, ray, visit),
-            _ if groups.len() <= FLAT => visit_sorted(groups, ray, visit),
-            _ => self
-                .tree
-                .visit(&SlabRay::new(ray), f64::from(ray.range().t_far), |group| visit(&groups[group as usize])),
+    pub(crate) fn walk<'a>(&'a self, groups: &'a [GroupFrame], ray: &TravRay) -> Walk<'a> {
+        let order = if groups.len() <= 1 { Order::All } else { self.order(groups, ray) };
+        Walk { groups, next: 0, order }
+    }
+
+    fn order<'a>(&'a self, groups: &[GroupFrame], ray: &TravRay) -> Order<'a> {
+        let slabs = SlabRay::new(ray);
+        let t_far = f64::from(ray.range().t_far);
+        match self.kind {
+            TopKind::List => Order::Listed(slabs),
+            TopKind::Bvh2 if groups.len() <= FLAT => Order::Sorted(Sorted::new(groups, &slabs, t_far)),
+            TopKind::Bvh2 => Order::Tree(self.tree.walk(slabs, t_far)),
         }
     }
 }
 
-/// Every group in turn.
-#[inline(always)]
-fn visit_in_order(groups: &[GroupFrame], ray: &TravRay, mut visit: impl FnMut(&GroupFrame) -> f64) {
-    let slabs = SlabRay::new(ray);
-    let mut t_far = f64::from(ray.range().t_far);
-    for group in groups {
-        if slabs.entry(&group.bounds, t_far).is_some() {
-            t_far = visit(group);
+/// A walk over groups. A loop over it keeps what is done with each group at one place, so that traversals are compiled
+/// once there, for the caller's SIMD level (a closure would be compiled for none).
+#[derive(Debug)]
+pub(crate) struct Walk<'a> {
+    groups: &'a [GroupFrame],
+    next: usize,
+    order: Order<'a>,
+}
+
+/// How a walk goes on.
+#[derive(Debug)]
+#[expect(clippy::large_enum_variant, reason = "lives on the stack for the time of a ray")]
+enum Order<'a> {
+    /// Every group, unseen.
+    All,
+    /// Every group whose box the ray meets.
+    Listed(SlabRay),
+    /// By entry.
+    Sorted(Sorted),
+    /// By the tree.
+    Tree(TreeWalk<'a>),
+}
+
+impl<'a> Walk<'a> {
+    /// The next group that the ray may hit no later than `t_far`.
+    #[inline(always)]
+    pub(crate) fn next(&mut self, t_far: f64) -> Option<&'a GroupFrame> {
+        if matches!(self.order, Order::All) {
+            let group = self.groups.get(self.next);
+            self.next += 1;
+            return group;
         }
+        self.next_of_many(t_far)
+    }
+
+    fn next_of_many(&mut self, t_far: f64) -> Option<&'a GroupFrame> {
+        let number = match &mut self.order {
+            Order::All => return None,
+            Order::Listed(slabs) => {
+                let rest = self.groups.get(self.next..)?;
+                let skip = rest.iter().position(|group| slabs.entry(&group.bounds, t_far).is_some())?;
+                self.next += skip + 1;
+                self.next - 1
+            }
+            Order::Sorted(sorted) => {
+                let (entry, number) = *sorted.met[..sorted.count].get(self.next)?;
+                self.next += 1;
+                if entry > t_far {
+                    return None;
+                }
+                number
+            }
+            Order::Tree(walk) => walk.next(t_far)? as usize,
+        };
+        self.groups.get(number)
     }
 }
 
 /// At most [`FLAT`] groups, in order of entry.
-#[inline(always)]
-fn visit_sorted(groups: &[GroupFrame], ray: &TravRay, mut visit: impl FnMut(&GroupFrame) -> f64) {
-    let slabs = SlabRay::new(ray);
-    let mut t_far = f64::from(ray.range().t_far);
-    let mut met = [(0.0, 0_usize); FLAT];
-    let mut count = 0;
-    for (number, group) in groups.iter().enumerate() {
-        let Some(entry) = slabs.entry(&group.bounds, t_far) else { continue };
-        let mut at = count;
-        while at > 0 && met[at - 1].0 > entry {
-            met[at] = met[at - 1];
-            at -= 1;
+#[derive(Debug)]
+struct Sorted {
+    met: [(f64, usize); FLAT],
+    count: usize,
+}
+
+impl Sorted {
+    fn new(groups: &[GroupFrame], slabs: &SlabRay, t_far: f64) -> Self {
+        let mut met = [(0.0, 0_usize); FLAT];
+        let mut count = 0;
+        for (number, group) in groups.iter().enumerate() {
+            let Some(entry) = slabs.entry(&group.bounds, t_far) else { continue };
+            let mut at = count;
+            while at > 0 && met[at - 1].0 > entry {
+                met[at] = met[at - 1];
+                at -= 1;
+            }
+            met[at] = (entry, number);
+            count += 1;
         }
-        met[at] = (entry, number);
-        count += 1;
-    }
-    for &(entry, number) in &met[..count] {
-        if entry > t_far {
-            break;
-        }
-        t_far = visit(&groups[number]);
+        Self { met, count }
     }
 }

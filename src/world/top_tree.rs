@@ -7,8 +7,8 @@ const BINS: usize = 12;
 /// Depth from which splits halve the count: at most 32 more levels for any number of boxes.
 const SAH_DEPTH: usize = 24;
 
-/// Greatest number of nodes that wait on the stack of a walk: one a level.
-const STACK: usize = SAH_DEPTH + 33;
+/// Greatest number of nodes that wait on the stack of a walk: one a level, and the next one.
+const STACK: usize = SAH_DEPTH + 34;
 
 /// A binary tree over the boxes of groups, one group a leaf.
 ///
@@ -71,45 +71,51 @@ impl TopTree {
         self.split(first + 1, right, depth + 1);
     }
 
-    /// Calls `visit` with each group whose box the ray meets before the bound that the last call returned,
-    /// nearer child first.
-    #[inline(always)]
-    pub(crate) fn visit(&self, ray: &SlabRay, mut t_far: f64, mut visit: impl FnMut(u32) -> f64) {
-        let Some(root) = self.nodes.first() else { return };
-        let Some(entry) = ray.entry(&root.aabb, t_far) else { return };
-        let mut stack = [(0.0_f64, 0_u32); STACK];
-        let mut waiting = 0;
-        let mut current = (entry, 0_u32);
+    /// The groups whose boxes `ray` meets, nearer child first.
+    pub(crate) fn walk(&self, ray: SlabRay, t_far: f64) -> TreeWalk<'_> {
+        let mut walk = TreeWalk { nodes: &self.nodes, ray, stack: [(0.0, 0); STACK], waiting: 0 };
+        if let Some(entry) = self.nodes.first().and_then(|root| walk.ray.entry(&root.aabb, t_far)) {
+            walk.stack[0] = (entry, 0);
+            walk.waiting = 1;
+        }
+        walk
+    }
+}
+
+/// A walk of one ray through a tree.
+#[derive(Debug)]
+pub(crate) struct TreeWalk<'a> {
+    nodes: &'a [TopNode],
+    ray: SlabRay,
+    /// Entry and number of nodes still to visit.
+    stack: [(f64, u32); STACK],
+    waiting: usize,
+}
+
+impl TreeWalk<'_> {
+    /// The next group whose box the ray enters no later than `t_far`.
+    pub(crate) fn next(&mut self, t_far: f64) -> Option<u32> {
         loop {
-            let node = &self.nodes[current.1 as usize];
-            let next = if node.leaf {
-                t_far = visit(node.link);
-                None
-            } else {
-                let [a, b] = [node.link, node.link + 1]
-                    .map(|child| ray.entry(&self.nodes[child as usize].aabb, t_far).map(|entry| (entry, child)));
-                match (a, b) {
-                    (Some(a), Some(b)) => {
-                        let (near, far) = if b.0 < a.0 { (b, a) } else { (a, b) };
-                        stack[waiting] = far;
-                        waiting += 1;
-                        Some(near)
-                    }
-                    (a, b) => a.or(b),
-                }
+            self.waiting = self.waiting.checked_sub(1)?;
+            let (entry, number) = self.stack[self.waiting];
+            if entry > t_far {
+                continue;
+            }
+            let node = self.nodes[number as usize];
+            if node.leaf {
+                return Some(node.link);
+            }
+            let child =
+                |child: u32| self.ray.entry(&self.nodes[child as usize].aabb, t_far).map(|entry| (entry, child));
+            let (a, b) = (child(node.link), child(node.link + 1));
+            let (near, far) = match (a, b) {
+                (Some(x), Some(y)) if y.0 < x.0 => (b, a),
+                _ => (a, b),
             };
-            current = match next {
-                Some(next) => next,
-                None => loop {
-                    if waiting == 0 {
-                        return;
-                    }
-                    waiting -= 1;
-                    if stack[waiting].0 <= t_far {
-                        break stack[waiting];
-                    }
-                },
-            };
+            for met in [far, near].into_iter().flatten() {
+                self.stack[self.waiting] = met;
+                self.waiting += 1;
+            }
         }
     }
 }
@@ -183,10 +189,10 @@ mod tests {
 
     fn visited(tree: &TopTree, ray: &Ray, t_far: f64) -> Vec<u32> {
         let mut groups = Vec::new();
-        tree.visit(&slabs(ray), t_far, |group| {
+        let mut walk = tree.walk(slabs(ray), t_far);
+        while let Some(group) = walk.next(t_far) {
             groups.push(group);
-            t_far
-        });
+        }
         groups.sort_unstable();
         groups
     }
