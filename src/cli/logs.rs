@@ -3,6 +3,7 @@
 use std::io::IsTerminal;
 
 use tracing::level_filters::LevelFilter;
+use tracing_subscriber::{Layer, filter::Targets, layer::SubscriberExt, util::SubscriberInitExt};
 
 /// How much is printed to stderr: -1 errors only, 0 warnings and progress, 1 and more the logs too.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -33,13 +34,15 @@ impl Verbosity {
     }
 }
 
-/// Sends the library's log lines to stderr.
+/// Sends the library's log lines to stderr; warnings of the window system's library only when logs are asked for.
 pub(crate) fn init(verbosity: Verbosity) {
-    tracing_subscriber::fmt()
-        .with_max_level(verbosity.filter())
+    let filter = verbosity.filter();
+    let foreign = if filter > LevelFilter::WARN { filter } else { LevelFilter::ERROR };
+    let lines = tracing_subscriber::fmt::layer()
         .with_writer(std::io::stderr)
         .with_ansi(std::io::stderr().is_terminal())
         .without_time()
-        .with_target(false)
-        .init();
+        .with_target(false);
+    let targets = Targets::new().with_default(filter).with_target("winit", foreign);
+    tracing_subscriber::registry().with(lines.with_filter(targets)).init();
 }

@@ -2,6 +2,7 @@
 
 use std::{
     path::{Path, PathBuf},
+    rc::Rc,
     sync::Arc,
 };
 
@@ -9,19 +10,22 @@ use clap::Args;
 use kinora::{
     accel::AccelKind,
     dynamics::RebuildPolicy,
-    player::{self, PlayError, PlayOptions, StartCamera},
-    render::Shading,
-    scene::import,
+    output::Unfinished,
+    player::{self, PlayError, PlayOptions, Services, StartCamera},
+    scene::{Scene, import},
 };
 
 use super::{
     error::CliError,
+    render::{self, MAX_SAMPLES},
     scene::{self, ANIMATION_HELP, SCENE_HELP},
     settings::Settings,
+    signals::Signals,
+    view::Viewpoint,
 };
 
-/// Samples a pixel of pictures that go to files.
-const STILL_SAMPLES: u32 = 1;
+/// Longest side of a window in pixels.
+const MAX_SIDE: u32 = 16_384;
 
 /// Arguments of `play`.
 #[derive(Debug, Args)]
@@ -43,6 +47,10 @@ pub(crate) struct PlayArgs {
     /// Most pictures a second while playing
     #[arg(long, value_name = "N", default_value_t = 60.0)]
     fps_limit: f64,
+    /// A camera of the file by index or name; auto takes the first, or frames the whole animation where there is
+    /// none; framed does that always
+    #[arg(long, value_name = "INDEX|NAME|auto|framed", default_value = "auto")]
+    camera: String,
     /// Hold this time of the animation instead of playing
     #[arg(long, value_name = "SECONDS")]
     at: Option<f64>,
@@ -53,24 +61,32 @@ pub(crate) struct PlayArgs {
     /// else at the end
     #[arg(long, value_name = "FILE")]
     screenshot: Option<PathBuf>,
+    /// Samples a pixel of pictures that are written to files
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    samples: u32,
 }
 
 /// Opens the window and plays until it is closed.
 ///
 /// # Errors
-/// When the scene cannot be loaded or there is no display.
+/// Usage errors before a window opens; no display; a screenshot that cannot be written; a signal.
 pub(crate) fn run(args: &PlayArgs, settings: &Settings) -> Result<(), CliError> {
-    let size = size(&args.size).ok_or_else(|| CliError::usage(format!("--size {}: expected WxH", args.size)))?;
-    let shading = Shading::ALL.into_iter().find(|s| s.name() == args.shading);
-    let shading = shading.ok_or_else(|| CliError::usage(format!("--shading {}: unknown", args.shading)))?;
     check(args)?;
+    let named = |flag: &'static str| move |why: String| CliError::usage(format!("--{flag} {why}"));
+    let size = render::size(&args.size).map_err(named("size"))?;
+    if size.0.max(size.1) > MAX_SIDE {
+        return Err(named("size")(format!("`{}`: sides of a window must be 1 to {MAX_SIDE}", args.size)));
+    }
+    let shading = render::shading(&args.shading).map_err(named("shading"))?;
+    let unfinished = Unfinished::default();
+    let signals = Signals::watch(&unfinished)?;
     let scene = scene::load(args.scene.as_deref(), settings)?;
     let clips = args.animation.as_deref().map(|name| scene::select_clips(&scene, Some(name))).transpose()?;
     let options = PlayOptions {
         clips,
         speed: args.speed,
         at_s: args.at,
-        camera: StartCamera::Auto,
+        camera: camera(&args.camera, &scene)?,
         shading,
         structure: settings.accel.clone(),
         structures: AccelKind::ALL.iter().map(|kind| kind.name().to_owned()).collect(),
@@ -78,14 +94,36 @@ pub(crate) fn run(args: &PlayArgs, settings: &Settings) -> Result<(), CliError> 
         fps_limit: args.fps_limit,
         exit_after_s: args.exit_after,
         screenshot: args.screenshot.clone(),
-        still_samples: STILL_SAMPLES,
+        still_samples: args.samples,
     };
+    let signals = Rc::new(signals);
+    let watched = Rc::clone(&signals);
     let pool = Arc::clone(&settings.pool);
-    let load =
-        move |file: &Path| pool.install(|| import::from_path(file)).map(Arc::new).map_err(|error| error.to_string());
-    let frames = settings.frame_config(RebuildPolicy::default());
-    player::play(Arc::new(scene), &options, frames, settings.simd, Arc::new(load), Box::new(|| false))?;
-    Ok(())
+    let services = Services {
+        frames: settings.frame_config(RebuildPolicy::default()),
+        simd: settings.simd,
+        load: Arc::new(move |file| pool.install(|| open(file))),
+        stop: Box::new(move || watched.check().is_err()),
+        unfinished,
+    };
+    player::play(Arc::new(scene), &options, services)?;
+    signals.check()
+}
+
+/// Loads a file that was dropped on the window.
+fn open(file: &Path) -> Result<Arc<Scene>, String> {
+    import::from_path(file).map(Arc::new).map_err(|error| error.to_string())
+}
+
+fn camera(choice: &str, scene: &Scene) -> Result<StartCamera, CliError> {
+    match choice {
+        "auto" => Ok(StartCamera::Auto),
+        "framed" => Ok(StartCamera::Framed),
+        _ => Ok(match Viewpoint::select(scene, choice, &[], 1.0)? {
+            Viewpoint::Node(node) => StartCamera::Node(node),
+            Viewpoint::Fixed(_) => StartCamera::Framed,
+        }),
+    }
 }
 
 /// Checks that numbers make sense.
@@ -98,18 +136,15 @@ fn check(args: &PlayArgs) -> Result<(), CliError> {
     if !(args.fps_limit.is_finite() && args.fps_limit > 0.0) {
         return wrong("fps-limit", args.fps_limit, "a positive number");
     }
+    if !(1..=MAX_SAMPLES).contains(&args.samples) {
+        return Err(CliError::usage(format!("--samples {}: expected 1 to {MAX_SAMPLES}", args.samples)));
+    }
     for (flag, value) in [("at", args.at), ("exit-after", args.exit_after)] {
         if let Some(value) = value.filter(|v| !(v.is_finite() && *v >= 0.0)) {
             return wrong(flag, value, "seconds, at least 0");
         }
     }
     Ok(())
-}
-
-fn size(text: &str) -> Option<(u32, u32)> {
-    let (width, height) = text.split_once(['x', 'X'])?;
-    let side = |text: &str| text.parse().ok().filter(|side| (1..=16_384).contains(side));
-    Some((side(width)?, side(height)?))
 }
 
 impl From<PlayError> for CliError {

@@ -25,7 +25,7 @@ pub(super) fn encode(slot: &mut FrameSlot, stamp: &Stamp) -> Result<(), String> 
 /// Writes a PNG of `rgb` (3 bytes a pixel, rows top down) to the end of `out`.
 ///
 /// Filter and level are the fastest of those measured that compress rendered pictures well.
-pub(super) fn encode_rgb(
+pub(crate) fn encode_rgb(
     width: u32,
     height: u32,
     rgb: &[u8],
@@ -49,7 +49,7 @@ pub(super) fn encode_rgb(
 }
 
 /// Keeps the first three of every four bytes.
-pub(super) fn drop_alpha(rgba: &[u8], rgb: &mut Vec<u8>) {
+pub(crate) fn drop_alpha(rgba: &[u8], rgb: &mut Vec<u8>) {
     rgb.clear();
     rgb.resize(rgba.len() / 4 * 3, 0);
     for (to, from) in rgb.chunks_exact_mut(3).zip(rgba.chunks_exact(4)) {

@@ -15,6 +15,7 @@ use crate::{
     anim::{ActiveClip, animation_bounds},
     dynamics::{FrameConfig, FrameLoop, LoopCounts, StageTimes},
     geom::Aabb,
+    output::Unfinished,
     render::{CameraView, Film, RenderSettings, Renderer},
     scene::{ClipId, Scene},
     simd::SimdLevel,
@@ -32,6 +33,7 @@ pub(super) struct TraceEngine {
     config: FrameConfig,
     simd: SimdLevel,
     still_samples: u32,
+    unfinished: Unfinished,
     stage: Option<Stage>,
     renderer: Renderer,
     film: Film,
@@ -126,11 +128,12 @@ struct Pass {
 impl TraceEngine {
     /// An engine that makes loops of `config` (but for the structure, which each shot names) and writes stills of
     /// `still_samples` samples a pixel.
-    pub(super) fn new(config: FrameConfig, simd: SimdLevel, still_samples: u32) -> Self {
+    pub(super) fn new(config: FrameConfig, simd: SimdLevel, still_samples: u32, unfinished: Unfinished) -> Self {
         Self {
             config,
             simd,
             still_samples,
+            unfinished,
             stage: None,
             renderer: Renderer::default(),
             film: Film::new(0, 0),
@@ -231,7 +234,7 @@ impl Engine for TraceEngine {
         let mut rgba = self.spent.pop().unwrap_or_default();
         let film = &self.film;
         self.config.pool.install(|| film.to_srgb8(&mut rgba));
-        let written = still::write(&job.file, &rgba, self.film.width, self.film.height);
+        let written = still::write(&job.file, &rgba, self.film.width, self.film.height, &self.unfinished);
         self.spent.push(rgba);
         written
     }

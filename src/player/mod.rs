@@ -28,12 +28,14 @@ mod window;
 mod worker;
 
 use std::{
+    fmt,
     path::{Path, PathBuf},
     sync::Arc,
 };
 
 use crate::{
     dynamics::FrameConfig,
+    output::Unfinished,
     render::Shading,
     scene::{ClipId, NodeId, Scene},
     simd::SimdLevel,
@@ -99,21 +101,33 @@ pub struct PlayOptions {
     pub still_samples: u32,
 }
 
-/// Opens the window and plays `scene` until it is closed.
-///
-/// `frames` says how worlds are made (its structure is that of `options`) and in which pool; `load` reads files that
-/// are dropped on the window.
+/// What playing draws on.
+pub struct Services {
+    /// How worlds are made (the structure is that of the options), and the pool all parallel work runs in.
+    pub frames: FrameConfig,
+    /// SIMD level; changes no picture.
+    pub simd: SimdLevel,
+    /// Reads files that are dropped on the window.
+    pub load: LoadFile,
+    /// Asks whether to stop.
+    pub stop: Stop,
+    /// Where pictures that are being written are listed.
+    pub unfinished: Unfinished,
+}
+
+impl fmt::Debug for Services {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Services").field("frames", &self.frames).field("simd", &self.simd).finish_non_exhaustive()
+    }
+}
+
+/// Opens the window and plays `scene` until it is closed or `services.stop` says so.
 ///
 /// # Errors
 /// When there is no display, the first frame cannot be made, or the screenshot of `options` cannot be written.
-pub fn play(
-    scene: Arc<Scene>,
-    options: &PlayOptions,
-    frames: FrameConfig,
-    simd: SimdLevel,
-    load: LoadFile,
-    stop: Stop,
-) -> Result<(), PlayError> {
+pub fn play(scene: Arc<Scene>, options: &PlayOptions, services: Services) -> Result<(), PlayError> {
+    let Services { frames, simd, load, stop, unfinished } = services;
     let display = window::Display::connect()?;
-    display.run(scene, options, TraceEngine::new(frames, simd, options.still_samples), load, stop)
+    let engine = TraceEngine::new(frames, simd, options.still_samples, unfinished);
+    display.run(scene, options, engine, load, stop)
 }

@@ -5,7 +5,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use crate::output::{Unfinished, atomic};
+use crate::output::{self, Unfinished, atomic};
 
 use super::request::StillFile;
 
@@ -18,28 +18,27 @@ const MOST_NUMBERS: u32 = 9999;
 ///
 /// # Errors
 /// When the picture is empty or the file cannot be written, in words that name the file.
-pub(super) fn write(file: &StillFile, rgba: &[u8], width: u32, height: u32) -> Result<PathBuf, String> {
+pub(super) fn write(
+    file: &StillFile,
+    rgba: &[u8],
+    width: u32,
+    height: u32,
+    unfinished: &Unfinished,
+) -> Result<PathBuf, String> {
     let bytes = encode(rgba, width, height).map_err(|e| format!("cannot make a PNG of {width}x{height}: {e}"))?;
     match file {
         StillFile::Exact(path) => {
-            atomic::write_file(path, &bytes, &Unfinished::default()).map_err(|e| e.to_string())?;
+            atomic::write_file(path, &bytes, unfinished).map_err(|e| e.to_string())?;
             Ok(path.clone())
         }
         StillFile::Numbered(stem) => write_numbered(Path::new("."), stem, &bytes),
     }
 }
 
-fn encode(rgba: &[u8], width: u32, height: u32) -> Result<Vec<u8>, png::EncodingError> {
-    let rgb: Vec<u8> = rgba.chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]]).collect();
-    let mut bytes = Vec::new();
-    let mut encoder = png::Encoder::new(&mut bytes, width, height);
-    encoder.set_color(png::ColorType::Rgb);
-    encoder.set_depth(png::BitDepth::Eight);
-    encoder.set_compression(png::Compression::Fast);
-    encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
-    let mut writer = encoder.write_header()?;
-    writer.write_image_data(&rgb)?;
-    writer.finish()?;
+fn encode(rgba: &[u8], width: u32, height: u32) -> Result<Vec<u8>, String> {
+    let (mut rgb, mut bytes) = (Vec::new(), Vec::new());
+    output::drop_alpha(rgba, &mut rgb);
+    output::encode_rgb(width, height, &rgb, None, &mut bytes)?;
     Ok(bytes)
 }
 
@@ -78,14 +77,14 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.png");
         let rgba = [1, 2, 3, 255, 250, 251, 252, 255];
-        write(&StillFile::Exact(path.clone()), &rgba, 2, 1).unwrap();
+        write(&StillFile::Exact(path.clone()), &rgba, 2, 1, &Unfinished::default()).unwrap();
         assert_eq!(image::open(path).unwrap().to_rgba8().into_raw(), rgba);
     }
 
     #[test]
     fn missing_folder_and_empty_picture_are_errors() {
         let file = StillFile::Exact("no/such/folder/a.png".into());
-        assert!(write(&file, &[0; 4], 1, 1).unwrap_err().contains("no/such/folder"));
-        assert!(write(&file, &[], 0, 0).is_err());
+        assert!(write(&file, &[0; 4], 1, 1, &Unfinished::default()).unwrap_err().contains("no/such/folder"));
+        assert!(write(&file, &[], 0, 0, &Unfinished::default()).is_err());
     }
 }

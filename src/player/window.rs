@@ -13,6 +13,7 @@ use softbuffer::{Context, Surface};
 use winit::{
     application::ApplicationHandler,
     dpi::PhysicalSize,
+    error::EventLoopError,
     event::{ElementState, MouseButton, MouseScrollDelta, WindowEvent},
     event_loop::{ActiveEventLoop, ControlFlow, EventLoop, EventLoopProxy, OwnedDisplayHandle},
     keyboard::{Key as WinitKey, NamedKey},
@@ -51,8 +52,8 @@ impl Display {
     /// # Errors
     /// [`PlayError::NoDisplay`] when there is none.
     pub(super) fn connect() -> Result<Self, PlayError> {
-        let reason = |e: &dyn std::fmt::Display| PlayError::NoDisplay(one_line(&e.to_string()));
-        EventLoop::<Wake>::with_user_event().build().map(Self).map_err(|e| reason(&e))
+        let reason = |e: EventLoopError| PlayError::NoDisplay(reason(&e.to_string()));
+        EventLoop::<Wake>::with_user_event().build().map(Self).map_err(reason)
     }
 
     /// Plays until the window is closed.
@@ -82,8 +83,12 @@ impl Display {
     }
 }
 
-fn one_line(text: &str) -> String {
-    text.split_whitespace().collect::<Vec<_>>().join(" ")
+/// The reason within winit's text, on one line and without the place in winit's source.
+fn reason(text: &str) -> String {
+    let after_place =
+        text.split_once(".rs:").and_then(|(_, rest)| rest.split_once(": ")).map_or(text, |(_, rest)| rest);
+    let words: Vec<_> = after_place.split_whitespace().collect();
+    words.join(" ").trim_end_matches('.').to_owned()
 }
 
 type Screen = Surface<OwnedDisplayHandle, Rc<Window>>;
@@ -316,4 +321,16 @@ fn pressed_key(key: &WinitKey) -> Option<Key> {
         }
         _ => return None,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn reason_leaves_out_where_winit_noticed() {
+        let text = "os error at /a/winit/src/linux/mod.rs:765: neither WAYLAND_DISPLAY\n nor DISPLAY is set.";
+        assert_eq!(reason(text), "neither WAYLAND_DISPLAY nor DISPLAY is set");
+        assert_eq!(reason("not supported"), "not supported");
+    }
 }

@@ -25,7 +25,7 @@ const MAX_SIDE: u32 = 65_535;
 const MAX_AREA: u64 = 1 << 27;
 
 /// Most samples a pixel.
-const MAX_SAMPLES: u32 = 1 << 20;
+pub(crate) const MAX_SAMPLES: u32 = 1 << 20;
 
 /// What the arguments say by themselves.
 #[derive(Debug)]
@@ -194,7 +194,11 @@ fn check_stdout(args: &RenderArgs) -> Result<(), CliError> {
     Ok(())
 }
 
-fn size(text: &str) -> Result<(u32, u32), String> {
+/// Width and height in pixels from `1280x720`.
+///
+/// # Errors
+/// Words on what is wrong with the text.
+pub(crate) fn size(text: &str) -> Result<(u32, u32), String> {
     let side = |t: &str| t.parse::<u32>().ok().filter(|_| t.bytes().all(|b| b.is_ascii_digit()));
     let parsed = text.split_once(['x', 'X']).and_then(|(w, h)| Some((side(w)?, side(h)?)));
     let (w, h) = parsed.ok_or_else(|| format!("`{text}`: expected WIDTHxHEIGHT in pixels, as 1280x720"))?;
