@@ -20,11 +20,13 @@ fn chain(count: usize) -> Scene {
     const JOINTS: u16 = 64;
     let mut nodes: Vec<SceneNode> = (0..JOINTS).map(|j| joint(u32::from(j), u32::from(JOINTS))).collect();
     nodes.push(SceneNode { mesh: Some(MeshId(0)), skin: Some(SkinId(0)), ..node() });
-    let at = |v: usize| v as f32 / count as f32 * f32::from(JOINTS - 4);
-    let positions = (0..count).map(|v| Vec3::new((v % 7) as f32 * 0.1, at(v) * 0.1, (v % 11) as f32 * 0.1)).collect();
+    // The first of a vertex' four joints.
+    let first = |v: usize| u16::try_from(v * usize::from(JOINTS - 4) / count).expect("below the joint count");
+    let height = |v: usize| v as f32 / count as f32 * f32::from(JOINTS - 4) * 0.1;
+    let positions = (0..count).map(|v| Vec3::new((v % 7) as f32 * 0.1, height(v), (v % 11) as f32 * 0.1)).collect();
     let influences = Influences {
         per_vertex: 4,
-        joints: (0..count).flat_map(|v| (0..4).map(move |k| at(v) as u16 + k)).collect(),
+        joints: (0..count).flat_map(|v| (0..4).map(move |k| first(v) + k)).collect(),
         weights: (0..count).flat_map(|v| [0.4, 0.3, 0.2, 0.1 + (v % 3) as f32 * 0.01]).collect(),
     };
     let turn = Sampler {

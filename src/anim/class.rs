@@ -131,6 +131,7 @@ fn rest_weights(scene: &Scene, node: NodeId) -> Vec<f64> {
 }
 
 /// True when the sampler gives `rest` at every time: all keys equal it, all tangents are zero.
+#[expect(clippy::float_cmp, reason = "a value that differs at all moves the part")]
 fn holds(sampler: &Sampler, rest: &[f64]) -> bool {
     let width = sampler.width.max(1);
     sampler.values.chunks(width).enumerate().all(|(slot, value)| {

@@ -17,6 +17,7 @@ pub fn loop_time(start_s: f64, elapsed_s: f64, speed: f64, duration_s: f64) -> f
 }
 
 #[cfg(test)]
+#[expect(clippy::float_cmp, reason = "these are exact")]
 mod tests {
     use super::*;
 

@@ -270,6 +270,7 @@ pub(super) fn placed(matrix: &DAffine3, p: Vec3) -> Vec3 {
 /// To `f32`, saturating; NaN stays NaN, and zero has no sign: where a channel holds the rest value but for the
 /// sign of a zero, the bits stay the same.
 #[inline(always)]
+#[expect(clippy::cast_possible_truncation, reason = "the one rounding, in range")]
 fn rounded(v: &[f64; 4]) -> Vec3 {
     const MAX: f64 = f32::MAX as f64;
     let narrow = |x: f64| x.clamp(-MAX, MAX) as f32 + 0.0;

@@ -26,6 +26,7 @@ enum Place {
 }
 
 /// NaN counts as the time before the first key.
+#[expect(clippy::float_cmp, reason = "on a key its value holds as stored")]
 fn locate(times: &[f32], time_s: f64) -> Place {
     let after = times.partition_point(|&t| f64::from(t) <= time_s);
     if after == 0 {

@@ -42,11 +42,11 @@ struct Header<'a> {
     animation: PosClips,
     times: [f64; 1],
     dtype: &'static str,
-    primitives: Vec<Primitive>,
+    primitives: Vec<PartEntry>,
 }
 
 #[derive(Serialize)]
-struct Primitive {
+struct PartEntry {
     node: u32,
     mesh: u32,
     primitive: u32,
@@ -63,7 +63,7 @@ struct Primitive {
 /// # Errors
 /// Those of `out`.
 pub fn write_pos(scene: &Scene, pose: &Pose, clips: PosClips, time_s: f64, out: &mut impl Write) -> io::Result<()> {
-    let primitive = |i: &PartInstance| Primitive {
+    let entry = |i: &PartInstance| PartEntry {
         node: i.node.0,
         mesh: i.mesh.0,
         primitive: i.part,
@@ -77,7 +77,7 @@ pub fn write_pos(scene: &Scene, pose: &Pose, clips: PosClips, time_s: f64, out: 
         animation: clips,
         times: [time_s],
         dtype: "<f8",
-        primitives: scene.instances.iter().map(primitive).collect(),
+        primitives: scene.instances.iter().map(entry).collect(),
     };
     serde_json::to_writer(&mut *out, &header)?;
     out.write_all(b"\n")?;

@@ -25,7 +25,7 @@ pub(crate) struct Node {
     pub(crate) mesh: Option<usize>,
     pub(crate) skin: Option<usize>,
     pub(crate) weights: Option<Vec<f32>>,
-    /// Translations, rotations, scales of EXT_mesh_gpu_instancing copies.
+    /// Translations, rotations, scales of `EXT_mesh_gpu_instancing` copies.
     pub(crate) copies: Vec<([f32; 3], [f32; 4], [f32; 3])>,
 }
 
@@ -64,7 +64,7 @@ pub(crate) struct Mesh {
     pub(crate) positions: Vec<[f32; 3]>,
     pub(crate) targets: Vec<Vec<[f32; 3]>>,
     pub(crate) weights: Vec<f32>,
-    /// JOINTS_n with WEIGHTS_n, one a vertex.
+    /// `JOINTS_n` with `WEIGHTS_n`, one a vertex.
     pub(crate) joint_sets: Vec<Vec<([u16; 4], [f32; 4])>>,
 }
 
@@ -80,7 +80,7 @@ pub(crate) enum Path {
     Rotation,
     Scale,
     Weights,
-    /// `/meshes/M/weights` through KHR_animation_pointer; the target is a mesh.
+    /// `/meshes/M/weights` through `KHR_animation_pointer`; the target is a mesh.
     MeshWeights,
 }
 

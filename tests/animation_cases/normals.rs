@@ -95,7 +95,7 @@ fn morph_targets_bend_normals_and_tangents() {
     assert!(normal.distance(Vec3::new(0.25, 0.75, 1.0).normalize()) < 1e-6);
     let (tangent, sign) = vertex_tangent(&scene, &pose, scene.instances[0], 4).unwrap();
     assert!(tangent.distance(Vec3::new(1.0, 0.0, 3.0).normalize()) < 1e-6);
-    assert_eq!(sign, -1.0);
+    assert!(sign < 0.0);
 }
 
 #[test]

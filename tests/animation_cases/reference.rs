@@ -42,7 +42,7 @@ fn slerp(a: &[f64], b: &[f64], u: f64) -> Vec<f64> {
     let (a, mut b) = (unit(a), unit(b));
     let mut dot: f64 = a.iter().zip(&b).map(|(x, y)| x * y).sum();
     if dot < 0.0 {
-        b.iter_mut().for_each(|v| *v = -*v);
+        b = b.iter().map(|v| -v).collect();
         dot = -dot;
     }
     if dot > 1.0 - 1e-12 {
@@ -108,7 +108,7 @@ impl<'a> Moment<'a> {
 
     fn driven(&self, target: usize, path: Path) -> Option<Vec<f64>> {
         let channels = self.playing.iter().flat_map(|&(a, t)| self.model.animations[a].iter().map(move |c| (c, t)));
-        channels.filter(|(c, _)| c.target == target && c.path == path).last().map(|(c, t)| sampled(c, t))
+        channels.filter(|(c, _)| c.target == target && c.path == path).next_back().map(|(c, t)| sampled(c, t))
     }
 
     fn local(&self, node: usize) -> Matrix {
