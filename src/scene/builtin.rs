@@ -5,20 +5,32 @@ use super::{
     import::{self, ImportError},
 };
 
-/// Names in the order they are listed; the first is the default scene.
-const NAMES: &[&str] = &["walk"];
+/// Names and files in the order they are listed; the first is the default scene.
+const SCENES: [(&str, &[u8]); 4] = [
+    ("walk", include_bytes!("../../animations/walk.glb")),
+    ("cloth", include_bytes!("../../animations/cloth.glb")),
+    ("explode", include_bytes!("../../animations/explode.glb")),
+    ("tumble", include_bytes!("../../animations/tumble.glb")),
+];
+
+const NAMES: [&str; SCENES.len()] = {
+    let mut names = [""; SCENES.len()];
+    let mut i = 0;
+    while i < names.len() {
+        names[i] = SCENES[i].0;
+        i += 1;
+    }
+    names
+};
 
 /// Names of the built-in scenes; the first one is the default.
 pub fn names() -> &'static [&'static str] {
-    NAMES
+    &NAMES
 }
 
 /// The `.glb` file of a built-in scene; `None` for an unknown name.
 pub fn bytes(name: &str) -> Option<&'static [u8]> {
-    Some(match name {
-        "walk" => include_bytes!("../../animations/walk.glb"),
-        _ => return None,
-    })
+    SCENES.iter().find(|scene| scene.0 == name).map(|scene| scene.1)
 }
 
 /// Imports a built-in scene. Its [`Scene::file`] is `builtin:NAME`.

@@ -40,10 +40,9 @@ pub fn cloth() -> Vec<u8> {
     let frame = frame(&mut glb);
     lower_bar(&mut glb, joints[JOINTS - 1]);
     let camera = glb.camera("three-quarter", DVec3::new(1.9, 1.45, 4.1), DVec3::new(0.0, 0.98, 0.0), deg(33.0));
-    let mut roots = joints;
-    roots.extend([node, frame, camera]);
+    let column = glb.node(Node { name: "column".into(), children: joints, ..Node::default() });
     glb.animation("twist and waves", &animation);
-    glb.finish(&roots)
+    glb.finish(&[column, node, frame, camera])
 }
 
 /// Height of joint `j` before anything moves; the first is at the upper bar.
@@ -51,7 +50,7 @@ fn rest_height(j: usize) -> f64 {
     TOP - HEIGHT * j as f64 / (JOINTS - 1) as f64
 }
 
-/// The joints, side by side under no parent: each is placed by the twist alone.
+/// The joints, side by side: each is placed by the twist alone.
 fn column(glb: &mut Glb, animation: &mut Animation, input: usize) -> Vec<usize> {
     let mut nodes = Vec::new();
     for j in 0..JOINTS {

@@ -41,7 +41,7 @@ pub fn explode() -> Vec<u8> {
     let node = glb.node(Node { name: "flake".into(), mesh: Some(mesh), skin, ..Node::default() });
     let core = core(&mut glb);
     let floor = floor(&mut glb);
-    let camera = glb.camera("front", DVec3::new(0.0, 0.95, 4.7), DVec3::new(0.0, -0.10, 0.0), deg(33.0));
+    let camera = glb.camera("front", DVec3::new(0.0, 1.00, 5.2), DVec3::new(0.0, -0.06, 0.0), deg(33.0));
     glb.animation("burst", &animation);
     glb.finish(&[root, node, core, floor, camera])
 }
@@ -229,9 +229,11 @@ fn patch(corners: [DVec3; 3], row: usize, column: usize, steps: usize) -> DVec3 
 }
 
 /// Unit vectors and triangles over them.
-struct Sphere {
-    points: Vec<DVec3>,
-    triangles: Vec<[u32; 3]>,
+pub struct Sphere {
+    /// Points of the unit sphere.
+    pub points: Vec<DVec3>,
+    /// Corners, counter-clockwise from outside.
+    pub triangles: Vec<[u32; 3]>,
 }
 
 fn octahedron() -> Sphere {
@@ -240,7 +242,8 @@ fn octahedron() -> Sphere {
     Sphere { points, triangles }
 }
 
-fn icosahedron() -> Sphere {
+/// The regular solid of twenty triangles.
+pub fn icosahedron() -> Sphere {
     let g = 0.5 * (1.0 + 5.0f64.sqrt());
     let mut points = Vec::new();
     for (a, b) in [(1.0, g), (-1.0, g), (1.0, -g), (-1.0, -g)] {

@@ -28,8 +28,6 @@ pub struct Node {
     pub skin: Option<usize>,
     /// Camera here.
     pub camera: Option<usize>,
-    /// Light here.
-    pub light: Option<usize>,
 }
 
 /// The interpolation of an animation sampler.
@@ -79,7 +77,6 @@ pub struct Glb {
     textures: Vec<String>,
     images: Vec<String>,
     cameras: Vec<String>,
-    lights: Vec<String>,
     quantized: bool,
 }
 
@@ -321,18 +318,6 @@ impl Glb {
         self.node(Node { name: name.to_owned(), translation: eye, rotation, camera, ..Node::default() })
     }
 
-    /// A node with a directional light that shines from `from` towards `to`; `lux` is its illuminance.
-    pub fn sun(&mut self, name: &str, from: DVec3, to: DVec3, color: [f64; 3], lux: f64) -> usize {
-        self.lights.push(format!(
-            "{{\"name\":\"{name}\",\"type\":\"directional\",\"color\":[{}],\"intensity\":{}}}",
-            numbers(&color),
-            number(lux)
-        ));
-        let light = Some(self.lights.len() - 1);
-        let rotation = Some(super::maths::look_at(from, to));
-        self.node(Node { name: name.to_owned(), translation: from, rotation, light, ..Node::default() })
-    }
-
     /// The finished file with `roots` as its scene.
     pub fn finish(mut self, roots: &[usize]) -> Vec<u8> {
         while !self.bin.len().is_multiple_of(4) {
@@ -357,21 +342,10 @@ impl Glb {
     }
 
     fn json(&self, roots: &[usize]) -> String {
-        let mut used = Vec::new();
-        if self.quantized {
-            used.push("\"KHR_mesh_quantization\"");
-        }
-        let required = if self.quantized { ",\"extensionsRequired\":[\"KHR_mesh_quantization\"]" } else { "" };
-        if !self.lights.is_empty() {
-            used.push("\"KHR_lights_punctual\"");
-        }
         let mut json = String::from("{\"asset\":{\"version\":\"2.0\",\"generator\":\"kinora make_scenes\"}");
-        if !used.is_empty() {
-            let _ = write!(json, ",\"extensionsUsed\":[{}]{required}", used.join(","));
-        }
-        if !self.lights.is_empty() {
-            let lights = self.lights.join(",");
-            let _ = write!(json, ",\"extensions\":{{\"KHR_lights_punctual\":{{\"lights\":[{lights}]}}}}");
+        if self.quantized {
+            let names = "[\"KHR_mesh_quantization\"]";
+            let _ = write!(json, ",\"extensionsUsed\":{names},\"extensionsRequired\":{names}");
         }
         let _ = write!(json, ",\"scene\":0,\"scenes\":[{{\"nodes\":{}}}]", list(roots));
         let nodes: Vec<String> = self.nodes.iter().map(node_json).collect();
@@ -422,9 +396,6 @@ fn node_json(node: &Node) -> String {
         if let Some(value) = value {
             fields.push(format!("\"{key}\":{value}"));
         }
-    }
-    if let Some(light) = node.light {
-        fields.push(format!("\"extensions\":{{\"KHR_lights_punctual\":{{\"light\":{light}}}}}"));
     }
     format!("{{{}}}", fields.join(","))
 }

@@ -92,6 +92,13 @@ impl Shape {
         self.triangles.extend(other.triangles.iter().map(|t| t.map(|i| i + first)));
     }
 
+    /// Writes one mesh for each material over the same vertices, without texture coordinates.
+    pub fn write_each(&self, glb: &mut Glb, name: &str, materials: &[usize]) -> Vec<usize> {
+        let attributes = [("POSITION", glb.positions(&self.positions)), ("NORMAL", glb.vectors(&self.normals))];
+        let indices = glb.triangles(&self.triangles);
+        materials.iter().map(|&material| glb.mesh(name, &attributes, indices, material)).collect()
+    }
+
     /// Writes the mesh; returns its number.
     pub fn write(&self, glb: &mut Glb, name: &str, material: usize) -> usize {
         let attributes = [

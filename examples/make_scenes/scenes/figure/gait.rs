@@ -43,28 +43,28 @@ fn toes_up(angle: f64) -> DQuat {
     about(DVec3::X, -angle)
 }
 
-/// The foot on the ground, `phase` since its heel strike.
-fn stance(phase: f64) -> Foot {
+/// The foot on the ground, `phase` since its heel strike, pointing along `yaw`.
+fn stance(phase: f64, yaw: DQuat) -> Foot {
     let flat = DVec3::new(0.0, ANKLE_HEIGHT, -0.015 + STRIDE * (0.5 * STANCE - phase));
     let rise = smoothstep(0.30, 0.68, phase) / smoothstep(0.30, 0.68, STANCE);
     let pitch =
         STRIKE_PITCH * (1.0 - smoothstep(-0.04, 0.10, phase)) / (1.0 - smoothstep(-0.04, 0.10, 0.0)) - HEEL_RISE * rise;
     // The pivot keeps its place on the ground: the heel at first, the toe joint (toes flat) at the end.
     let pivot = if pitch > 0.0 { HEEL } else { DVec3::new(BALL.x, BALL.y + 0.03, BALL.z) };
-    Foot { ankle: flat + pivot - toes_up(pitch) * pivot, pitch, toe_bend: (-pitch).max(0.0) }
+    Foot { ankle: flat + yaw * (pivot - toes_up(pitch) * pivot), pitch, toe_bend: (-pitch).max(0.0) }
 }
 
 /// The foot at any phase of the cycle, 0 at heel strike.
-fn foot(phase: f64) -> Foot {
+fn foot(phase: f64, yaw: DQuat) -> Foot {
     let phase = phase - phase.floor();
     if phase <= STANCE {
-        return stance(phase);
+        return stance(phase, yaw);
     }
     let alpha = (phase - STANCE) / (1.0 - STANCE);
-    let (off, strike) = (stance(STANCE), stance(0.0));
+    let (off, strike) = (stance(STANCE, yaw), stance(0.0, yaw));
     let h = 1e-4;
     let scale = (1.0 - STANCE) / h;
-    let (before, after) = (stance(STANCE - h), stance(h));
+    let (before, after) = (stance(STANCE - h, yaw), stance(h, yaw));
     let leave = (off.ankle - before.ankle) * scale;
     let arrive = (after.ankle - strike.ankle) * scale;
     let ankle = hermite(off.ankle, leave, strike.ankle, arrive, alpha);
@@ -75,7 +75,7 @@ fn foot(phase: f64) -> Foot {
     Foot {
         ankle: ankle + DVec3::Y * lift,
         pitch,
-        toe_bend: off.toe_bend * (1.0 - smoothstep(0.0, 0.45, alpha))
+        toe_bend: off.toe_bend * (1.0 - smoothstep(0.05, 0.75, alpha))
             - 0.15 * smoothstep(0.6, 1.0, alpha) * (1.0 - alpha),
     }
 }
@@ -128,11 +128,12 @@ fn trunk(at: &mut Stance, phase: f64) {
 /// A leg whose heel strikes at `phase` 0, by two-bone inverse kinematics.
 fn leg(at: &mut Stance, phase: f64, [thigh, shin, foot_joint, toes]: [Joint; 4]) {
     let side = if thigh == Joint::ThighL { 1.0 } else { -1.0 };
-    let foot = foot(phase);
+    let yaw = about(DVec3::Y, side * TOE_OUT);
+    let foot = foot(phase, yaw);
     let hip_offset = thigh.position() - Joint::Hips.position();
     let hip = at.hips + at.world[Joint::Hips as usize] * hip_offset;
     let ankle = foot.ankle + DVec3::X * (side * 0.068);
-    let forward = about(DVec3::Y, side * TOE_OUT) * DVec3::Z;
+    let forward = yaw * DVec3::Z;
     let reach = ankle - hip;
     let length = reach.length().min(0.9995 * (LEG[0] + LEG[1]));
     let up = -reach / reach.length();
@@ -142,7 +143,7 @@ fn leg(at: &mut Stance, phase: f64, [thigh, shin, foot_joint, toes]: [Joint; 4])
     let bend = libm::acos(length / (LEG[0] + LEG[1]));
     at.world[thigh as usize] = frame * about(DVec3::X, -bend);
     at.world[shin as usize] = frame * about(DVec3::X, bend);
-    let sole = about(DVec3::Y, side * TOE_OUT) * toes_up(foot.pitch);
+    let sole = yaw * toes_up(foot.pitch);
     at.world[foot_joint as usize] = sole;
     at.world[toes as usize] = sole * toes_up(foot.toe_bend);
 }

@@ -53,7 +53,7 @@ pub const LEG: [f64; 2] = [0.365, 0.365];
 /// Height of the ankle above the ground with the foot flat.
 pub const ANKLE_HEIGHT: f64 = 0.09;
 /// From the ankle to the point of the heel that the foot rolls over.
-pub const HEEL: DVec3 = DVec3::new(0.0, -ANKLE_HEIGHT, -0.05);
+pub const HEEL: DVec3 = DVec3::new(0.0, -ANKLE_HEIGHT, -0.058);
 /// From the ankle to the ball of the foot on the ground.
 pub const BALL: DVec3 = DVec3::new(0.0, -ANKLE_HEIGHT, 0.108);
 
