@@ -1,12 +1,22 @@
 //! Arguments as typed; [`Settings`](super::settings::Settings) checks the common ones.
 
 use clap::{ArgAction, Args, Parser, Subcommand};
+use kinora::{
+    accel::{AccelKind, AccelSpec},
+    world::TopKind,
+};
 
 #[cfg(feature = "player")]
 use super::play::PlayArgs;
 use super::{
-    cast::CastArgs, completions::CompletionsArgs, info::InfoArgs, logs::Verbosity, man::ManArgs, pose::PoseArgs,
+    cast::CastArgs,
+    completions::CompletionsArgs,
+    info::InfoArgs,
+    logs::Verbosity,
+    man::ManArgs,
+    pose::PoseArgs,
     render::RenderArgs,
+    values::{self, SimdChoice},
 };
 
 /// Plays, renders and queries animated glTF scenes by ray tracing on the CPU.
@@ -46,18 +56,17 @@ pub(crate) struct CommonArgs {
     /// Worker threads [default: KINORA_THREADS, else what the scheduler granted, else all cores]
     #[arg(long, global = true, value_name = "N")]
     pub(crate) threads: Option<usize>,
-    /// Structure over triangles, with its settings: NAME[:key=value,...]
-    #[arg(long, global = true, value_name = "NAME", default_value = "bvh2")]
-    pub(crate) accel: String,
+    #[arg(long, global = true, value_name = "NAME", default_value = "bvh2", value_parser = values::accel, help = accel_help())]
+    pub(crate) accel: AccelSpec,
     /// Structure over groups of triangles
-    #[arg(long, global = true, value_name = "NAME", default_value = "bvh2")]
-    pub(crate) top: String,
-    /// Precision of hits; `exact` is the only one there is
+    #[arg(long, global = true, value_name = "NAME", default_value = "bvh2", value_parser = values::top())]
+    pub(crate) top: TopKind,
+    /// Precision of hits; exact is the only one there is
     #[arg(long, global = true, value_name = "PRECISION", default_value = "exact", value_parser = precision)]
     pub(crate) precision: Precision,
-    /// Instruction set of the kernels: auto, scalar, avx2 or avx512; changes no result
-    #[arg(long, global = true, value_name = "LEVEL", default_value = "auto")]
-    pub(crate) simd: String,
+    /// Instruction set of the kernels; changes no result
+    #[arg(long, global = true, value_name = "LEVEL", default_value = "auto", value_parser = values::simd())]
+    pub(crate) simd: SimdChoice,
     /// Print errors only
     #[arg(short, long, global = true, conflicts_with = "verbose")]
     quiet: bool,
@@ -78,6 +87,10 @@ impl CommonArgs {
 pub(crate) enum Precision {
     /// Correctly rounded.
     Exact,
+}
+
+fn accel_help() -> String {
+    format!("Structure over triangles, with its settings: NAME[:key=value,...]; there are {}", AccelKind::names())
 }
 
 fn precision(text: &str) -> Result<Precision, String> {

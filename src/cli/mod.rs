@@ -20,6 +20,7 @@ mod settings;
 mod shard;
 mod signals;
 mod stdout;
+mod values;
 mod view;
 
 use std::process::ExitCode;

@@ -8,16 +8,16 @@ use kinora::{
 };
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
-use super::{args::CommonArgs, error::CliError, logs::Verbosity};
+use super::{args::CommonArgs, error::CliError, logs::Verbosity, values::SimdChoice};
 
 /// What every command may rely on.
 #[derive(Debug)]
 pub(crate) struct Settings {
     /// The program's own pool; all parallel work is installed into it.
     pub(crate) pool: Arc<ThreadPool>,
-    /// Structure over triangles, with settings, as typed.
+    /// Structure over triangles, with settings.
     pub(crate) accel: String,
-    /// Structure over groups, as typed.
+    /// Structure over groups.
     pub(crate) top: String,
     /// SIMD level that this machine has.
     pub(crate) simd: SimdLevel,
@@ -39,9 +39,9 @@ impl Settings {
             .map_err(|e| CliError::failed(format!("cannot start {threads} threads: {e}")))?;
         Ok(Self {
             pool: Arc::new(pool),
-            accel: args.accel.clone(),
-            top: args.top.clone(),
-            simd: simd(&args.simd)?,
+            accel: args.accel.to_string(),
+            top: args.top.name().to_owned(),
+            simd: simd(args.simd)?,
             verbosity: args.verbosity(),
         })
     }
@@ -57,19 +57,14 @@ impl Settings {
     }
 }
 
-fn simd(text: &str) -> Result<SimdLevel, CliError> {
-    if text == "auto" {
-        return Ok(SimdLevel::best());
-    }
-    let level: SimdLevel =
-        text.parse().map_err(|_| CliError::usage(format!("--simd {text}: expected auto, scalar, avx2 or avx512")))?;
-    if level.is_available() {
-        Ok(level)
-    } else {
-        Err(CliError::usage(format!(
-            "--simd {text}: this machine has no {text}; the best it has is {}",
-            SimdLevel::best()
-        )))
+fn simd(choice: SimdChoice) -> Result<SimdLevel, CliError> {
+    let best = SimdLevel::best();
+    match choice {
+        SimdChoice::Auto => Ok(best),
+        SimdChoice::Level(level) if level.is_available() => Ok(level),
+        SimdChoice::Level(level) => {
+            Err(CliError::usage(format!("--simd {level}: this machine has no {level}; the best it has is {best}")))
+        }
     }
 }
 

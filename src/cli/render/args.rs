@@ -2,10 +2,20 @@
 
 use std::path::PathBuf;
 
-use clap::Args;
-use kinora::output::Fps;
+use clap::{Args, builder::TypedValueParser};
+use kinora::{
+    dynamics::RebuildPolicy,
+    output::{Chroma, ExrColor, Fps, FrameList},
+    render::Shading,
+};
 
-use crate::cli::scene::{ANIMATION_HELP, SCENE_HELP};
+use crate::cli::{
+    scene::{ANIMATION_HELP, SCENE_HELP},
+    values,
+};
+
+/// Most samples a pixel.
+const MAX_SAMPLES: i64 = 1 << 20;
 
 /// Arguments of `render`.
 #[derive(Debug, Args)]
@@ -17,23 +27,23 @@ pub(crate) struct RenderArgs {
     #[arg(short, long, value_name = "PATTERN", default_value = "frames/frame_####.png")]
     pub(super) output: PathBuf,
     /// Frames, in commas: A, A..=B, A-B, A..B (without B), A-BxSTEP [default: the whole animation]
-    #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
-    pub(super) frames: Option<String>,
+    #[arg(long, value_name = "LIST", value_parser = frames, allow_hyphen_values = true)]
+    pub(super) frames: Option<FrameList>,
     /// Frames a second; frame k is the moment k/fps seconds. A number or a fraction such as 30000/1001
     #[arg(long, value_name = "N", default_value_t = Fps::DEFAULT)]
     pub(super) fps: Fps,
     /// Width and height in pixels
-    #[arg(long, value_name = "WxH", default_value = "1280x720")]
-    pub(super) size: String,
+    #[arg(long, value_name = "WxH", default_value = "1280x720", value_parser = values::size)]
+    pub(super) size: (u32, u32),
     /// Samples a pixel
-    #[arg(long, value_name = "N", default_value_t = 1)]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=MAX_SAMPLES))]
     pub(super) samples: u32,
     /// Seed of the sample pattern
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub(super) seed: u64,
-    /// What a pixel shows: eyelight, normals, depth, ao or direct
-    #[arg(long, value_name = "NAME", default_value = "direct")]
-    pub(super) shading: String,
+    /// What a pixel shows
+    #[arg(long, value_name = "NAME", default_value = "direct", value_parser = values::shading())]
+    pub(super) shading: Shading,
     /// A camera of the file by index or name; auto takes the first, or frames the whole animation where there is
     /// none; framed does that always
     #[arg(long, value_name = "INDEX|NAME|auto|framed", default_value = "auto")]
@@ -52,16 +62,28 @@ pub(crate) struct RenderArgs {
     /// Number of array tasks, where the scheduler of --shard auto does not tell
     #[arg(long, value_name = "N", requires = "shard")]
     pub(super) shard_count: Option<usize>,
-    /// Numbers of the colour layer of .exr: half or float
-    #[arg(long, value_name = "KIND", default_value = "half")]
-    pub(super) exr_color: String,
-    /// Colour resolution of .y4m: 420 or 444
-    #[arg(long, value_name = "KIND", default_value = "420")]
-    pub(super) chroma: String,
+    /// Numbers of the colour layer of .exr
+    #[arg(long, value_name = "KIND", default_value = "half", value_parser = exr_color())]
+    pub(super) exr_color: ExrColor,
+    /// Colour resolution of .y4m
+    #[arg(long, value_name = "KIND", default_value = "420", value_parser = chroma())]
+    pub(super) chroma: Chroma,
     /// How structures are kept good: async, refit, rebuild or swap-every=K; changes no pixel
-    #[arg(long, value_name = "NAME", default_value = "async")]
-    pub(super) policy: String,
+    #[arg(long, value_name = "NAME", default_value = "async", value_parser = values::policy)]
+    pub(super) policy: RebuildPolicy,
     /// Print one JSON object with counts and times
     #[arg(long)]
     pub(super) json: bool,
+}
+
+fn frames(text: &str) -> Result<FrameList, String> {
+    text.parse()
+}
+
+fn exr_color() -> impl TypedValueParser<Value = ExrColor> + Clone {
+    values::named([("half", ExrColor::Half), ("float", ExrColor::Float)])
+}
+
+fn chroma() -> impl TypedValueParser<Value = Chroma> + Clone {
+    values::named([("420", Chroma::C420), ("444", Chroma::C444)])
 }

@@ -20,57 +20,30 @@ use crate::cli::{
     view::Viewpoint,
 };
 
-/// Longest side and largest area of a picture in pixels.
-const MAX_SIDE: u32 = 65_535;
-const MAX_AREA: u64 = 1 << 27;
-
-/// Most samples a pixel.
-pub(crate) const MAX_SAMPLES: u32 = 1 << 20;
-
-/// What the arguments say by themselves.
+/// What the arguments say together, without the scene.
 #[derive(Debug)]
 pub(super) struct Request {
     target: Target,
-    frames: Option<FrameList>,
-    size: (u32, u32),
-    shading: Shading,
     shard: Option<Shard>,
-    exr_color: ExrColor,
-    chroma: Chroma,
-    policy: RebuildPolicy,
 }
 
 impl Request {
-    /// Checks every option that needs no scene.
+    /// Checks the options against each other.
     ///
     /// # Errors
     /// A usage error naming the option.
     pub(super) fn check(args: &RenderArgs) -> Result<Self, CliError> {
-        let named = |option: &'static str| move |why: String| CliError::usage(format!("--{option} {why}"));
-        let output = args.output.display().to_string();
+        let output = args.output.display();
         let target = Target::parse(&args.output).map_err(|why| CliError::usage(format!("--output {output}: {why}")))?;
-        if !(1..=MAX_SAMPLES).contains(&args.samples) {
-            return Err(named("samples")(format!("{}: expected 1 to {MAX_SAMPLES}", args.samples)));
-        }
         if target == Target::Stdout {
             check_stdout(args)?;
         }
         if args.shard.is_some() && target.holds_all_frames() {
-            return Err(named("shard")(format!(
-                "{output}: parts of one film cannot be joined; use a numbered sequence"
+            return Err(CliError::usage(format!(
+                "--shard with --output {output}: parts of one film cannot be joined; use a numbered sequence"
             )));
         }
-        Ok(Self {
-            target,
-            frames: args.frames.as_deref().map(str::parse).transpose().map_err(named("frames"))?,
-            size: size(&args.size).map_err(named("size"))?,
-            shading: shading(&args.shading).map_err(named("shading"))?,
-            shard: args.shard.as_deref().map(|s| shard::shard(s, args.shard_count)).transpose()?,
-            exr_color: pick(&args.exr_color, &[("half", ExrColor::Half), ("float", ExrColor::Float)])
-                .map_err(named("exr-color"))?,
-            chroma: pick(&args.chroma, &[("420", Chroma::C420), ("444", Chroma::C444)]).map_err(named("chroma"))?,
-            policy: policy(&args.policy).map_err(named("policy"))?,
-        })
+        Ok(Self { target, shard: args.shard.as_deref().map(|s| shard::shard(s, args.shard_count)).transpose()? })
     }
 }
 
@@ -107,11 +80,12 @@ impl Plan {
         loaded: Loaded,
         settings: &Settings,
     ) -> Result<Self, CliError> {
-        let Request { target, frames, size, shading, shard, exr_color, chroma, policy } = request;
+        let Request { target, shard } = request;
+        let &RenderArgs { size, shading, exr_color, chroma, policy, .. } = args;
         let Loaded { scene, digest } = loaded;
         let clips = scene::select_clips(&scene, args.animation.as_deref())?;
-        let list = match frames {
-            Some(list) => list,
+        let list = match &args.frames {
+            Some(list) => list.clone(),
             None => FrameList::whole(scene::duration(&scene, &clips), args.fps).map_err(CliError::usage)?,
         };
         let list = if target.holds_all_frames() { list } else { list.distinct() };
@@ -134,7 +108,7 @@ impl Plan {
             ("size", format!("{size:?}")),
             ("samples", args.samples.to_string()),
             ("seed", args.seed.to_string()),
-            ("shading", args.shading.clone()),
+            ("shading", shading.name().to_owned()),
             ("format", format!("{:?}", format_options(&target, exr_color, chroma))),
         ] {
             hasher.add(name, value.as_bytes());
@@ -192,68 +166,4 @@ fn check_stdout(args: &RenderArgs) -> Result<(), CliError> {
         return Err(CliError::usage("--output -: stdout is a terminal; send the video to a file or program"));
     }
     Ok(())
-}
-
-/// Width and height in pixels from `1280x720`.
-///
-/// # Errors
-/// Words on what is wrong with the text.
-pub(crate) fn size(text: &str) -> Result<(u32, u32), String> {
-    let side = |t: &str| t.parse::<u32>().ok().filter(|_| t.bytes().all(|b| b.is_ascii_digit()));
-    let parsed = text.split_once(['x', 'X']).and_then(|(w, h)| Some((side(w)?, side(h)?)));
-    let (w, h) = parsed.ok_or_else(|| format!("`{text}`: expected WIDTHxHEIGHT in pixels, as 1280x720"))?;
-    let sides = 1..=MAX_SIDE;
-    if !sides.contains(&w) || !sides.contains(&h) || u64::from(w) * u64::from(h) > MAX_AREA {
-        return Err(format!("`{text}`: sides must be 1 to {MAX_SIDE} and the area at most {MAX_AREA} pixels"));
-    }
-    Ok((w, h))
-}
-
-/// The value named `text`.
-fn pick<T: Copy>(text: &str, values: &[(&str, T)]) -> Result<T, String> {
-    let names = || values.iter().map(|v| v.0).collect::<Vec<_>>().join(", ");
-    let found = values.iter().find(|v| v.0 == text).map(|v| v.1);
-    found.ok_or_else(|| format!("`{text}`: there are {}", names()))
-}
-
-/// The shading of a name.
-///
-/// # Errors
-/// Words naming those that exist.
-pub(crate) fn shading(text: &str) -> Result<Shading, String> {
-    pick(text, &Shading::ALL.map(|s| (s.name(), s)))
-}
-
-fn policy(text: &str) -> Result<RebuildPolicy, String> {
-    if let Some(k) = text.strip_prefix("swap-every=") {
-        let k = k.parse().ok().filter(|&k| k > 0);
-        return k
-            .map(RebuildPolicy::SwapEvery)
-            .ok_or_else(|| format!("`{text}`: expected swap-every=K with K of 1 or more"));
-    }
-    pick(text, &[("async", RebuildPolicy::Async), ("refit", RebuildPolicy::Refit), ("rebuild", RebuildPolicy::Rebuild)])
-        .map_err(|why| format!("{why}, swap-every=K"))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn sizes_are_two_positive_numbers_within_bounds() {
-        assert_eq!(size("1280x720"), Ok((1280, 720)));
-        assert_eq!(size("1X1"), Ok((1, 1)));
-        for wrong in ["", "x", "1280", "0x1", "1x0", "-1x5", "1x5x6", "65536x1", "60000x60000", "1.5x2", "+1x2"] {
-            assert!(size(wrong).is_err(), "{wrong}");
-        }
-    }
-
-    #[test]
-    fn policies_are_named() {
-        assert_eq!(policy("async"), Ok(RebuildPolicy::Async));
-        assert_eq!(policy("swap-every=3"), Ok(RebuildPolicy::SwapEvery(3)));
-        for wrong in ["", "swap-every=0", "swap-every=", "swap-every=x", "never"] {
-            assert!(policy(wrong).is_err(), "{wrong}");
-        }
-    }
 }
