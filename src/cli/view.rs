@@ -44,6 +44,14 @@ impl Viewpoint {
         found.map(Self::Node).ok_or_else(|| CliError::usage(missing(scene, choice)))
     }
 
+    /// A text that differs where, for one scene and choice of clips, the view does.
+    pub(crate) fn key(self) -> String {
+        match self {
+            Self::Node(node) => format!("node {}", node.0),
+            Self::Fixed(_) => "framed".to_owned(),
+        }
+    }
+
     /// The view of one frame.
     pub(crate) fn view(self, world: &World) -> Option<CameraView> {
         match self {

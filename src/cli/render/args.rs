@@ -30,16 +30,17 @@ pub(crate) struct RenderArgs {
     #[arg(long, value_name = "LIST", value_parser = frames, allow_hyphen_values = true)]
     pub(super) frames: Option<FrameList>,
     /// Frames a second; frame k is the moment k/fps seconds. A number or a fraction such as 30000/1001
-    #[arg(long, value_name = "N", default_value_t = Fps::DEFAULT)]
+    #[arg(long, value_name = "N", default_value_t = Fps::DEFAULT, allow_hyphen_values = true)]
     pub(super) fps: Fps,
     /// Width and height in pixels
     #[arg(long, value_name = "WxH", default_value = "1280x720", value_parser = values::size)]
     pub(super) size: (u32, u32),
     /// Samples a pixel
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=MAX_SAMPLES))]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=MAX_SAMPLES),
+        allow_negative_numbers = true)]
     pub(super) samples: u32,
     /// Seed of the sample pattern
-    #[arg(long, value_name = "N", default_value_t = 0)]
+    #[arg(long, value_name = "N", default_value_t = 0, allow_negative_numbers = true)]
     pub(super) seed: u64,
     /// What a pixel shows
     #[arg(long, value_name = "NAME", default_value = "direct", value_parser = values::shading())]

@@ -30,6 +30,7 @@ pub(crate) fn run(args: &RenderArgs, settings: &Settings) -> Result<(), CliError
     let plan = Plan::new(args, request, loaded, settings)?;
     let to_do = existing::remaining(&plan, settings)?;
     signals.check()?;
+    tracing::info!("{} frames to render, {} kept", to_do.len(), plan.frames.len() - to_do.len());
     if let Some(file) = to_do.first().and_then(|&f| plan.target.file(f)) {
         atomic::prepare(&file)?;
     }

@@ -103,7 +103,7 @@ impl Plan {
         hasher.add("scene", &digest);
         for (name, value) in [
             ("clips", format!("{clips:?}")),
-            ("camera", args.camera.clone()),
+            ("camera", viewpoint.key()),
             ("fps", args.fps.to_string()),
             ("size", format!("{size:?}")),
             ("samples", args.samples.to_string()),
