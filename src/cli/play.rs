@@ -12,15 +12,16 @@ use kinora::{
     dynamics::RebuildPolicy,
     output::Unfinished,
     player::{self, PlayError, PlayOptions, Services, StartCamera},
+    render::Shading,
     scene::{Scene, import},
 };
 
 use super::{
     error::CliError,
-    render::{self, MAX_SAMPLES},
     scene::{self, ANIMATION_HELP, SCENE_HELP},
     settings::Settings,
     signals::Signals,
+    values,
     view::Viewpoint,
 };
 
@@ -39,11 +40,11 @@ pub(crate) struct PlayArgs {
     #[arg(long, value_name = "FACTOR", default_value_t = 1.0, allow_negative_numbers = true)]
     speed: f64,
     /// Width and height of the window in pixels
-    #[arg(long, value_name = "WxH", default_value = "1280x720")]
-    size: String,
-    /// What a pixel shows: eyelight, normals, depth, ao or direct
-    #[arg(long, value_name = "NAME", default_value = "direct")]
-    shading: String,
+    #[arg(long, value_name = "WxH", default_value = "1280x720", value_parser = values::size)]
+    size: (u32, u32),
+    /// What a pixel shows
+    #[arg(long, value_name = "NAME", default_value = "direct", value_parser = values::shading())]
+    shading: Shading,
     /// Most pictures a second while playing
     #[arg(long, value_name = "N", default_value_t = 60.0)]
     fps_limit: f64,
@@ -62,7 +63,7 @@ pub(crate) struct PlayArgs {
     #[arg(long, value_name = "FILE")]
     screenshot: Option<PathBuf>,
     /// Samples a pixel of pictures that are written to files
-    #[arg(long, value_name = "N", default_value_t = 1)]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = values::samples())]
     samples: u32,
 }
 
@@ -72,12 +73,6 @@ pub(crate) struct PlayArgs {
 /// Usage errors before a window opens; no display; a screenshot that cannot be written; a signal.
 pub(crate) fn run(args: &PlayArgs, settings: &Settings) -> Result<(), CliError> {
     check(args)?;
-    let named = |flag: &'static str| move |why: String| CliError::usage(format!("--{flag} {why}"));
-    let size = render::size(&args.size).map_err(named("size"))?;
-    if size.0.max(size.1) > MAX_SIDE {
-        return Err(named("size")(format!("`{}`: sides of a window must be 1 to {MAX_SIDE}", args.size)));
-    }
-    let shading = render::shading(&args.shading).map_err(named("shading"))?;
     let unfinished = Unfinished::default();
     let signals = Signals::watch(&unfinished)?;
     let scene = scene::load(args.scene.as_deref(), settings)?;
@@ -87,10 +82,10 @@ pub(crate) fn run(args: &PlayArgs, settings: &Settings) -> Result<(), CliError> 
         speed: args.speed,
         at_s: args.at,
         camera: camera(&args.camera, &scene)?,
-        shading,
+        shading: args.shading,
         structure: settings.accel.clone(),
         structures: AccelKind::ALL.iter().map(|kind| kind.name().to_owned()).collect(),
-        size,
+        size: args.size,
         fps_limit: args.fps_limit,
         exit_after_s: args.exit_after,
         screenshot: args.screenshot.clone(),
@@ -136,8 +131,9 @@ fn check(args: &PlayArgs) -> Result<(), CliError> {
     if !(args.fps_limit.is_finite() && args.fps_limit > 0.0) {
         return wrong("fps-limit", args.fps_limit, "a positive number");
     }
-    if !(1..=MAX_SAMPLES).contains(&args.samples) {
-        return Err(CliError::usage(format!("--samples {}: expected 1 to {MAX_SAMPLES}", args.samples)));
+    let (width, height) = args.size;
+    if width.max(height) > MAX_SIDE {
+        return Err(CliError::usage(format!("--size {width}x{height}: a window's sides are at most {MAX_SIDE}")));
     }
     for (flag, value) in [("at", args.at), ("exit-after", args.exit_after)] {
         if let Some(value) = value.filter(|v| !(v.is_finite() && *v >= 0.0)) {

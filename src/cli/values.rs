@@ -8,6 +8,9 @@ use kinora::{accel::AccelSpec, dynamics::RebuildPolicy, render::Shading, simd::S
 const MAX_SIDE: u32 = 65_535;
 const MAX_AREA: u64 = 1 << 27;
 
+/// Most samples a pixel.
+const MAX_SAMPLES: i64 = 1 << 20;
+
 /// One of several named values.
 pub(crate) fn named<T, const N: usize>(values: [(&'static str, T); N]) -> impl TypedValueParser<Value = T> + Clone
 where
@@ -17,6 +20,11 @@ where
         let found = values.iter().find(|v| v.0 == name);
         found.expect("the parser lets only these names pass").1
     })
+}
+
+/// Samples a pixel.
+pub(crate) fn samples() -> impl TypedValueParser<Value = u32> + Clone {
+    clap::value_parser!(u32).range(1..=MAX_SAMPLES)
 }
 
 /// What a pixel shows.

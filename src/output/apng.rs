@@ -1,5 +1,6 @@
 //! Animated PNG. Each frame is compressed by itself, so that encoder threads work on several at once; the
 //! chunks are those of the "Animated PNG Specification" 1.0, with one data chunk a frame.
+#![expect(clippy::cast_possible_truncation, reason = "frames are at most MAX_FRAMES, chunks below 2^31 bytes")]
 
 use super::{FilmSettings, FrameSlot, png_file, stamp::KEYWORD};
 
@@ -68,7 +69,9 @@ fn chunk(out: &mut Vec<u8>, name: [u8; 4], parts: &[&[u8]]) {
     out.extend((length as u32).to_be_bytes());
     let start = out.len();
     out.extend(name);
-    parts.iter().for_each(|p| out.extend_from_slice(p));
+    for part in parts {
+        out.extend_from_slice(part);
+    }
     let crc = crc32fast::hash(&out[start..]);
     out.extend(crc.to_be_bytes());
 }

@@ -1,6 +1,6 @@
 //! Frame rates and lists of frame numbers.
 
-use std::{fmt, ops::RangeInclusive, str::FromStr};
+use std::{fmt, ops::Range, str::FromStr};
 
 /// Most frames that one list may hold.
 pub const MAX_FRAMES: usize = 10_000_000;
@@ -134,16 +134,13 @@ impl FromStr for FrameList {
     fn from_str(text: &str) -> Result<Self, String> {
         let mut frames = Vec::new();
         for item in text.split(',') {
-            let (range, step) = parse_item(item.trim()).map_err(|why| format!("`{}`: {why}", item.trim()))?;
-            let count = (range.end() + step - range.start()) / step;
-            if frames.len() as u64 + count > MAX_FRAMES as u64 {
-                return Err(format!("`{}`: more than {MAX_FRAMES} frames", item.trim()));
+            let wrong = |why: String| format!("`{}`: {why}", item.trim());
+            let (Range { start, end }, step) = parse_item(item.trim()).map_err(wrong)?;
+            if frames.len() as u64 + (end - start).div_ceil(step) > MAX_FRAMES as u64 {
+                return Err(wrong(format!("more than {MAX_FRAMES} frames")));
             }
-            #[expect(
-                clippy::cast_possible_truncation,
-                reason = "step may only pass usize where it passes the range too"
-            )]
-            frames.extend(range.step_by(step as usize));
+            let step = usize::try_from(step).unwrap_or(usize::MAX);
+            frames.extend((start..end).step_by(step));
         }
         if frames.is_empty() {
             return Err(format!("`{text}`: no frames"));
@@ -152,8 +149,8 @@ impl FromStr for FrameList {
     }
 }
 
-/// A range that may be empty only as `A..A`, written `1..=0`, and its step.
-fn parse_item(item: &str) -> Result<(RangeInclusive<u64>, u64), String> {
+/// The range of an item, which may be empty, and its step.
+fn parse_item(item: &str) -> Result<(Range<u64>, u64), String> {
     let (range, step) = match item.split_once('x') {
         None => (item, None),
         Some((range, step)) => (range, Some(step)),
@@ -164,19 +161,15 @@ fn parse_item(item: &str) -> Result<(RangeInclusive<u64>, u64), String> {
     let Some((first, last, included)) = ends else {
         let frame = number(range)?;
         return match step {
-            None => Ok((frame..=frame, 1)),
+            None => Ok((frame..frame + 1, 1)),
             Some(_) => Err("a step needs a range, as 0-60x2".to_owned()),
         };
     };
     let (first, last) = (number(first)?, number(last)?);
-    let step = step.map_or(Ok(1), number)?;
-    if step == 0 {
-        return Err("the step must be at least 1".to_owned());
-    }
-    match last.checked_sub(u64::from(!included)) {
+    match step.map_or(Ok(1), number)? {
+        0 => Err("the step must be at least 1".to_owned()),
         _ if last < first => Err("ends before it begins".to_owned()),
-        Some(last) if first <= last => Ok((first..=last, step)),
-        _ => Ok((1..=0, 1)),
+        step => Ok((first..last + u64::from(included), step)),
     }
 }
 
@@ -293,10 +286,10 @@ mod tests {
     #[test]
     fn every_multiple_of_a_frame_in_f32_seconds_reaches_its_frame() {
         for fps in [24u32, 25, 30, 60] {
-            for k in (0..20_000u32).step_by(97) {
-                let duration = f64::from(k as f32 / fps as f32);
+            for k in (0..20_000u16).step_by(97) {
+                let duration = f64::from(f32::from(k) / fps as f32);
                 let list = FrameList::whole(duration, Fps::new(fps, 1).unwrap()).unwrap();
-                assert_eq!(list.frames.len() as u32, k + 1, "{k} at {fps}");
+                assert_eq!(list.frames.len(), usize::from(k) + 1, "{k} at {fps}");
             }
         }
     }

@@ -47,7 +47,8 @@ impl SettingsHasher {
 
     /// The hash of all that was added.
     pub fn finish(self) -> SettingsHash {
-        SettingsHash(self.digest().iter().map(|b| format!("{b:02x}")).collect())
+        let hex = |digit: u8| char::from(b"0123456789abcdef"[usize::from(digit)]);
+        SettingsHash(self.digest().iter().flat_map(|b| [hex(b >> 4), hex(b & 15)]).collect())
     }
 }
 
@@ -84,7 +85,9 @@ mod tests {
 
     fn hash(parts: &[(&str, &str)]) -> String {
         let mut hasher = SettingsHasher::default();
-        parts.iter().for_each(|(n, v)| hasher.add(n, v.as_bytes()));
+        for (name, value) in parts {
+            hasher.add(name, value.as_bytes());
+        }
         hasher.finish().0
     }
 

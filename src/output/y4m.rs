@@ -1,4 +1,4 @@
-//! YUV4MPEG2: 8-bit Y'CbCr with the BT.709 matrix in limited range, 4:2:0 or 4:4:4.
+//! YUV4MPEG2: 8-bit Y'`CbCr` with the BT.709 matrix in limited range, 4:2:0 or 4:4:4.
 //!
 //! In 4:2:0 a chroma sample is the mean of its 2 x 2 pixels, so it sits in their middle, which the header calls
 //! `420jpeg`. The header has no word for the matrix: players take BT.709 from the size, or are told.
@@ -31,7 +31,7 @@ pub(super) fn header(film: &FilmSettings) -> Vec<u8> {
     let mut line = String::new();
     let FilmSettings { width, height, fps, stamp, .. } = film;
     let (num, den) = (fps.num(), fps.den());
-    write!(line, "YUV4MPEG2 W{width} H{height} F{num}:{den} Ip A1:1 C{chroma} XCOLORRANGE=LIMITED XKINORA={stamp}\n")
+    writeln!(line, "YUV4MPEG2 W{width} H{height} F{num}:{den} Ip A1:1 C{chroma} XCOLORRANGE=LIMITED XKINORA={stamp}")
         .expect("a string takes all that is written");
     line.into_bytes()
 }

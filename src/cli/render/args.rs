@@ -14,9 +14,6 @@ use crate::cli::{
     values,
 };
 
-/// Most samples a pixel.
-const MAX_SAMPLES: i64 = 1 << 20;
-
 /// Arguments of `render`.
 #[derive(Debug, Args)]
 pub(crate) struct RenderArgs {
@@ -36,7 +33,7 @@ pub(crate) struct RenderArgs {
     #[arg(long, value_name = "WxH", default_value = "1280x720", value_parser = values::size)]
     pub(super) size: (u32, u32),
     /// Samples a pixel
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=MAX_SAMPLES),
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = values::samples(),
         allow_negative_numbers = true)]
     pub(super) samples: u32,
     /// Seed of the sample pattern

@@ -12,8 +12,6 @@ mod summary;
 use kinora::output::{Unfinished, atomic};
 
 pub(crate) use args::RenderArgs;
-#[cfg(feature = "player")]
-pub(crate) use plan::{MAX_SAMPLES, shading, size};
 
 use super::{error::CliError, scene, settings::Settings, signals::Signals, stdout};
 use plan::{Plan, Request};
