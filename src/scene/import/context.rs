@@ -7,7 +7,7 @@ use std::{
 
 use super::{
     buffers::Buffers,
-    error::{Problem, Step},
+    error::{Problem, Step, one_line},
     json::Document,
 };
 
@@ -26,7 +26,7 @@ impl Warnings {
     pub(super) fn add(&self, place: impl Display, text: impl Display) {
         let mut list = self.list.borrow_mut();
         if list.len() < MAX_WARNINGS {
-            list.push(format!("{place}: {text}"));
+            list.push(one_line(&format!("{place}: {text}")));
         } else {
             self.dropped.set(self.dropped.get() + 1);
         }

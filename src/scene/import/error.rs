@@ -61,7 +61,7 @@ pub(super) enum Problem {
 impl Problem {
     /// Something at `place` is not valid glTF.
     pub(super) fn at(place: impl Display, reason: impl Display) -> Self {
-        Self::Invalid { place: place.to_string(), reason: reason.to_string() }
+        Self::Invalid { place: one_line(&place.to_string()), reason: one_line(&reason.to_string()) }
     }
 
     /// The place in the file.
@@ -89,6 +89,22 @@ impl Problem {
             Self::TooLarge { place, needed, left, limit } => ImportError::TooLarge { file, place, needed, left, limit },
         }
     }
+}
+
+/// Most characters of a place, reason or warning: a file may put its own text into them.
+const MAX_TEXT: usize = 400;
+
+/// `text` on one line, control characters escaped, cut after [`MAX_TEXT`] characters.
+pub(super) fn one_line(text: &str) -> String {
+    let mut line = String::with_capacity(text.len().min(MAX_TEXT));
+    for (i, c) in text.chars().enumerate() {
+        if i == MAX_TEXT {
+            line.push_str("...");
+            break;
+        }
+        if c.is_control() { line.extend(c.escape_default()) } else { line.push(c) }
+    }
+    line
 }
 
 /// Result of an import step.

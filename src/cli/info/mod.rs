@@ -1,7 +1,14 @@
 //! `kinora info`: what a file holds and what it needs.
 
-use clap::Args;
+mod left_out;
+mod summary;
+mod text;
 
+use clap::Args;
+use kinora::scene::builtin;
+use serde_json::json;
+
+use self::summary::Summary;
 use super::{
     error::CliError,
     scene::{self, SCENE_HELP},
@@ -18,7 +25,7 @@ pub(crate) struct InfoArgs {
     #[arg(long)]
     json: bool,
     /// Name the built-in scenes, one a line
-    #[arg(long)]
+    #[arg(long, conflicts_with = "scene")]
     list_builtin: bool,
 }
 
@@ -27,6 +34,18 @@ pub(crate) struct InfoArgs {
 /// # Errors
 /// When the scene cannot be loaded or stdout cannot be written.
 pub(crate) fn run(args: &InfoArgs, settings: &Settings) -> Result<(), CliError> {
+    if args.list_builtin {
+        return list_builtin(args.json);
+    }
     let scene = scene::load(args.scene.as_deref(), settings)?;
-    stdout::write(format!("{}\n", scene.file).as_bytes())
+    let summary = Summary::new(&scene);
+    if args.json { stdout::write_json(&summary) } else { stdout::write(text::format(&summary).as_bytes()) }
+}
+
+fn list_builtin(as_json: bool) -> Result<(), CliError> {
+    if as_json {
+        return stdout::write_json(&json!({ "builtin": builtin::names() }));
+    }
+    let lines: String = builtin::names().iter().flat_map(|name| [*name, "\n"]).collect();
+    stdout::write(lines.as_bytes())
 }
