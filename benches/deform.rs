@@ -141,7 +141,7 @@ fn bench(c: &mut Criterion) {
         group.bench_function(BenchmarkId::new(name, "parallel"), |b| {
             b.iter(|| {
                 for (&instance, out) in scene.instances.iter().zip(&mut out) {
-                    deform_parallel(&scene, &pose, instance, out);
+                    deform_parallel(SimdLevel::best(), &scene, &pose, instance, out);
                 }
             });
         });

@@ -15,7 +15,7 @@ const MAY_IMPORT: &[(&str, &[&str])] = &[
     ("world", &["accel", "anim", "scene", "simd"]),
     ("dynamics", &["world", "anim", "accel", "scene", "simd"]),
     ("render", &["world", "scene", "anim", "accel", "simd"]),
-    ("output", &["render", "dynamics", "world", "anim", "scene"]),
+    ("output", &["render", "dynamics", "world", "anim", "scene", "simd"]),
     ("player", &["output", "render", "dynamics", "world", "anim", "accel", "scene", "simd"]),
 ];
 

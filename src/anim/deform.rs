@@ -97,18 +97,19 @@ pub fn deform_range_at(
     dispatch(level, Deform { part, weights, placement: placement(scene, pose, instance), first, out });
 }
 
-/// [`deform`] in parallel over ranges of vertices, in the current rayon pool. The same bits.
+/// [`deform`] in parallel over ranges of vertices, in the current rayon pool, compiled for a given level. The same
+/// bits.
 ///
 /// # Panics
-/// When `out` has another length than the part has vertices.
-pub fn deform_parallel(scene: &Scene, pose: &Pose, instance: PartInstance, out: &mut [Vec3]) {
+/// When `out` has another length than the part has vertices, or the machine lacks `level`.
+pub fn deform_parallel(level: SimdLevel, scene: &Scene, pose: &Pose, instance: PartInstance, out: &mut [Vec3]) {
     assert_eq!(out.len(), scene.part(instance).positions.len(), "one place a vertex");
     if out.len() <= DEFORM_GRAIN {
-        return deform_range(scene, pose, instance, 0, out);
+        return deform_range_at(level, scene, pose, instance, 0, out);
     }
     out.par_chunks_mut(DEFORM_GRAIN)
         .enumerate()
-        .for_each(|(chunk, out)| deform_range(scene, pose, instance, chunk * DEFORM_GRAIN, out));
+        .for_each(|(chunk, out)| deform_range_at(level, scene, pose, instance, chunk * DEFORM_GRAIN, out));
 }
 
 /// The work of one range.

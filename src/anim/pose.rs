@@ -99,8 +99,9 @@ impl Pose {
     /// Evaluates `clips` together over the rest pose; a later clip wins where two drive the same target.
     ///
     /// `world_from_scene` is applied above the roots. Channels on a node that is given as a matrix do nothing
-    /// (importers take such matrices apart where that loses nothing). Weights driven at a node win over those driven at its mesh. Only nodes at or below one that
-    /// is driven, or was in the evaluation before, are computed anew.
+    /// (importers take such matrices apart where that loses nothing). Weights driven at a node win over those
+    /// driven at its mesh. Only nodes at or below one that is driven, or was in the evaluation before, are
+    /// computed anew.
     ///
     /// Cost: O(channels log keys + nodes + joints), no allocation, one thread.
     ///

@@ -6,7 +6,7 @@ use clap::Args;
 use kinora::{
     anim::Pose,
     glam::DAffine3,
-    output::{AtomicFile, PosClips, Unfinished, atomic, write_pos},
+    output::{AtomicFile, PosClips, PosFile, Unfinished, atomic},
 };
 
 use super::{
@@ -40,18 +40,19 @@ pub(crate) fn run(args: &PoseArgs, settings: &Settings) -> Result<(), CliError> 
     }
     let scene = scene::load(args.scene.as_deref(), settings)?;
     let clips = scene::select_clips(&scene, args.animation.as_deref())?;
-    let label = match (clips.as_slice(), args.animation.as_deref()) {
+    let mut pose = Pose::rest(&scene);
+    pose.evaluate(&scene, &scene::at_time(&clips, args.time), &DAffine3::IDENTITY);
+    let clips = match (clips.as_slice(), args.animation.as_deref()) {
         (_, Some("all")) => PosClips::All,
         (&[clip], _) => PosClips::One(clip),
         _ => PosClips::None,
     };
-    let mut pose = Pose::rest(&scene);
-    pose.evaluate(&scene, &scene::at_time(&clips, args.time), &DAffine3::IDENTITY);
     atomic::prepare(&args.output)?;
     let mut file = AtomicFile::create(&args.output, &Unfinished::default())?;
+    let content = PosFile { scene: &scene, pose: &pose, clips, time_s: args.time, simd: settings.simd };
     settings
         .pool
-        .install(|| write_pos(&scene, &pose, label, args.time, &mut file))
+        .install(|| content.write(&mut file))
         .map_err(|e| CliError::failed(format!("{}: cannot write: {e}", args.output.display())))?;
     Ok(file.finish()?)
 }

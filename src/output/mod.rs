@@ -28,7 +28,7 @@ pub use frames::{Fps, FrameList, MAX_FRAME, MAX_FRAMES, Shard};
 pub use pattern::{FilmFormat, Pattern, StillFormat, Target};
 #[cfg(feature = "player")]
 pub(crate) use png_file::{drop_alpha, encode_rgb};
-pub use pos_file::{PosClips, write_pos};
+pub use pos_file::{PosClips, PosFile};
 pub use resume::{Expected, Unfit, check_film, check_still};
 pub use slot::FrameSlot;
 pub use stamp::{SettingsHash, SettingsHasher, Stamp};

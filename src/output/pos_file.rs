@@ -11,6 +11,7 @@ use serde::{Serialize, Serializer};
 use crate::{
     anim::{Pose, deform_parallel},
     scene::{ClipId, PartInstance, Scene},
+    simd::SimdLevel,
 };
 
 /// Which clips a pose was evaluated with, for the header.
@@ -55,40 +56,58 @@ struct PartEntry {
     count: usize,
 }
 
-/// Writes every part instance of `scene` as it is at `pose`, in pose order.
-///
-/// `clips` and `time_s` (finite) only go into the header. Deforms in the current rayon pool, one part in memory at
-/// a time.
-///
-/// # Errors
-/// Those of `out`.
-pub fn write_pos(scene: &Scene, pose: &Pose, clips: PosClips, time_s: f64, out: &mut impl Write) -> io::Result<()> {
-    let entry = |i: &PartInstance| PartEntry {
-        node: i.node.0,
-        mesh: i.mesh.0,
-        primitive: i.part,
-        instance: i.copy,
-        count: scene.part(*i).positions.len(),
-    };
-    let header = Header {
-        format: "gltf-worldpos-1",
-        source: &scene.file,
-        generator: concat!("kinora ", env!("CARGO_PKG_VERSION")),
-        animation: clips,
-        times: [time_s],
-        dtype: "<f8",
-        primitives: scene.instances.iter().map(entry).collect(),
-    };
-    serde_json::to_writer(&mut *out, &header)?;
-    out.write_all(b"\n")?;
-    let mut positions = Vec::new();
-    let mut bytes = Vec::new();
-    for &instance in &scene.instances {
-        positions.resize(scene.part(instance).positions.len(), Vec3::ZERO);
-        deform_parallel(scene, pose, instance, &mut positions);
-        bytes.clear();
-        bytes.extend(positions.iter().flat_map(Vec3::to_array).flat_map(|x| f64::from(x).to_le_bytes()));
-        out.write_all(&bytes)?;
+/// A pose and what a file of it says.
+#[derive(Clone, Copy, Debug)]
+pub struct PosFile<'a> {
+    /// The scene, all of whose part instances are written.
+    pub scene: &'a Scene,
+    /// The pose they are in.
+    pub pose: &'a Pose,
+    /// The clips that the pose was evaluated with; goes into the header.
+    pub clips: PosClips,
+    /// The time that the pose was evaluated at in seconds, finite; goes into the header.
+    pub time_s: f64,
+    /// SIMD level of the deform kernel; changes no byte.
+    pub simd: SimdLevel,
+}
+
+impl PosFile<'_> {
+    /// Writes the file, part instances in pose order. Deforms in the current rayon pool, one part in memory at a
+    /// time.
+    ///
+    /// # Errors
+    /// Those of `out`.
+    pub fn write(&self, out: &mut impl Write) -> io::Result<()> {
+        serde_json::to_writer(&mut *out, &self.header())?;
+        out.write_all(b"\n")?;
+        let mut positions = Vec::new();
+        let mut bytes = Vec::new();
+        for &instance in &self.scene.instances {
+            positions.resize(self.scene.part(instance).positions.len(), Vec3::ZERO);
+            deform_parallel(self.simd, self.scene, self.pose, instance, &mut positions);
+            bytes.clear();
+            bytes.extend(positions.iter().flat_map(Vec3::to_array).flat_map(|x| f64::from(x).to_le_bytes()));
+            out.write_all(&bytes)?;
+        }
+        Ok(())
     }
-    Ok(())
+
+    fn header(&self) -> Header<'_> {
+        let entry = |i: &PartInstance| PartEntry {
+            node: i.node.0,
+            mesh: i.mesh.0,
+            primitive: i.part,
+            instance: i.copy,
+            count: self.scene.part(*i).positions.len(),
+        };
+        Header {
+            format: "gltf-worldpos-1",
+            source: &self.scene.file,
+            generator: concat!("kinora ", env!("CARGO_PKG_VERSION")),
+            animation: self.clips,
+            times: [self.time_s],
+            dtype: "<f8",
+            primitives: self.scene.instances.iter().map(entry).collect(),
+        }
+    }
 }

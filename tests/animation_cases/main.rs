@@ -437,7 +437,7 @@ fn every_level_range_and_thread_count_gives_the_same_bits() {
             let mut whole = vec![Vec3::NAN; 9_999];
             deform_range_at(SimdLevel::Scalar, &scene, &pose, instance, 0, &mut whole);
             let mut other = vec![Vec3::NAN; 9_999];
-            deform_parallel(&scene, &pose, instance, &mut other);
+            deform_parallel(SimdLevel::best(), &scene, &pose, instance, &mut other);
             assert_eq!(bits(&whole), bits(&other));
             for level in SimdLevel::ALL.into_iter().filter(|l| l.is_available()) {
                 for (first, count) in [(0, 9_999), (0, 1), (9_998, 1), (63, 66), (1_001, 4_096), (5, 0)] {
