@@ -3,7 +3,7 @@
 use std::io::IsTerminal;
 
 use tracing::level_filters::LevelFilter;
-use tracing_subscriber::{Layer, filter::Targets, layer::SubscriberExt, util::SubscriberInitExt};
+use tracing_subscriber::{Layer, filter::Targets, fmt::format::FmtSpan, layer::SubscriberExt, util::SubscriberInitExt};
 
 /// How much is printed to stderr: -1 errors only, 0 warnings and progress, 1 and more the logs too.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -34,13 +34,14 @@ impl Verbosity {
     }
 }
 
-/// Sends the library's log lines to stderr; warnings of the window system's library only when logs are asked for.
+/// Sends the library's log lines to stderr, from -vv on with the time of each stage; warnings of the window system's library only when logs are asked for.
 pub(crate) fn init(verbosity: Verbosity) {
     let filter = verbosity.filter();
     let foreign = if filter > LevelFilter::WARN { filter } else { LevelFilter::ERROR };
     let lines = tracing_subscriber::fmt::layer()
         .with_writer(std::io::stderr)
         .with_ansi(std::io::stderr().is_terminal())
+        .with_span_events(if filter >= LevelFilter::DEBUG { FmtSpan::CLOSE } else { FmtSpan::NONE })
         .without_time()
         .with_target(false);
     let targets = Targets::new().with_default(filter).with_target("winit", foreign);

@@ -24,7 +24,7 @@ pub(super) fn encode(slot: &mut FrameSlot, stamp: &Stamp) -> Result<(), String> 
 
 /// Writes a PNG of `rgb` (3 bytes a pixel, rows top down) to the end of `out`.
 ///
-/// Filter and level are the fastest of those measured that compress rendered pictures well.
+/// Filter and level were chosen by measurement: `benches/records/2026-11-22-png.md`.
 pub(crate) fn encode_rgb(
     width: u32,
     height: u32,
@@ -37,7 +37,7 @@ pub(crate) fn encode_rgb(
     encoder.set_color(ColorType::Rgb);
     encoder.set_depth(BitDepth::Eight);
     encoder.set_compression(Compression::Fast);
-    encoder.set_filter(Filter::Up);
+    encoder.set_filter(Filter::Paeth);
     encoder.set_source_srgb(SrgbRenderingIntent::Perceptual);
     if let Some(stamp) = stamp {
         encoder.add_text_chunk("Software".to_owned(), super::SOFTWARE.to_owned()).map_err(wrong)?;

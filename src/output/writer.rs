@@ -56,6 +56,7 @@ impl StillSettings {
     }
 
     fn write(&self, slot: &mut FrameSlot, unfinished: &Unfinished) -> Result<Written, OutputError> {
+        let _span = tracing::info_span!("encode", frame = slot.frame).entered();
         let start = Instant::now();
         let path = self.target.file(slot.frame).unwrap_or_default();
         let file = path.display().to_string();
@@ -179,6 +180,7 @@ impl Writer {
             let (jobs, line_up, settings) = (ends.jobs.clone(), line_up.clone(), Arc::clone(&settings));
             writer.spawn(move || {
                 for mut slot in &jobs {
+                    let _span = tracing::info_span!("encode", frame = slot.frame).entered();
                     let start = Instant::now();
                     let result = format.frame(&settings, &mut slot).map(|()| start.elapsed());
                     if line_up.send((slot, result)).is_err() {

@@ -121,6 +121,7 @@ impl<'a> Shots<'a> {
             frame: slot.frame,
             simd: self.settings.simd,
         };
+        let _span = tracing::info_span!("render", frame = slot.frame).entered();
         let Self { renderer, settings, .. } = self;
         let rays = settings.pool.install(|| renderer.render(&world, &view, &how, &mut slot.film));
         stages.frame(times, traced.elapsed(), start.elapsed(), rays);
