@@ -90,17 +90,19 @@ impl TriBlock {
     /// Evaluates all four triangles. Lanes of triangles that surely miss, or are surely hit outside of
     /// `[t_near, t_limit]`, are not in the mask; `t_limit` is at most the ray's end.
     #[inline(always)]
-    fn evaluate<S: Simd>(&self, ray: &BlockRay<S>, t_limit: f64) -> Evaluated<S> {
+    fn evaluate<S: Simd>(&self, ray: &BlockRay, t_limit: f64) -> Evaluated<S> {
         let corner = |k: usize| self.corners[k].map(|axis| S::widen(S::F4::load(&axis)));
         let (v0, v1, v2) = (corner(0), corner(1), corner(2));
-        let (e1, e2, s) = (sub::<S>(v1, v0), sub::<S>(v2, v0), sub::<S>(ray.origin, v0));
-        let (p, q) = (cross::<S>(ray.dir, e2), cross::<S>(s, e1));
-        let (det, u, v) = (dot::<S>(e1, p), dot::<S>(s, p), dot::<S>(ray.dir, q));
+        let (origin, dir) = (ray.origin.map(S::D4::splat), ray.dir.map(S::D4::splat));
+        let (e1, e2, s) = (sub::<S>(v1, v0), sub::<S>(v2, v0), sub::<S>(origin, v0));
+        let (p, q) = (cross::<S>(dir, e2), cross::<S>(s, e1));
+        let (det, u, v) = (dot::<S>(e1, p), dot::<S>(s, p), dot::<S>(dir, q));
         let w = det - u - v;
         let (n1, n2, ns) = (norm1::<S>(e1), norm1::<S>(e2), norm1::<S>(s));
         let n12 = n1 * n2;
-        let det_error = ray.reach * n12;
-        let uv_error = ray.reach * ns.mul_add_loose(n1 + n2, n12);
+        let reach = S::D4::splat(ray.reach);
+        let det_error = reach * n12;
+        let uv_error = reach * ns.mul_add_loose(n1 + n2, n12);
         let (low, high) = (u.min(v).min(w), u.max(v).max(w));
         let outside = low.lt(-uv_error) & uv_error.lt(high);
         let t_error = n12 * ns * S::D4::splat(BOUND);
@@ -111,10 +113,11 @@ impl TriBlock {
         let slack = t.abs().mul_add_loose(S::D4::splat(4.0 * f64::EPSILON), slack);
         let (t_low, t_high) = (t - slack, t + slack);
         let solid = (det_error * S::D4::splat(4.0)).le(det.abs());
-        let beyond = solid & (S::D4::splat(t_limit).lt(t_low) | t_high.lt(ray.t_near));
+        let (t_near, t_far) = (S::D4::splat(ray.t_near), S::D4::splat(ray.t_far));
+        let beyond = solid & (S::D4::splat(t_limit).lt(t_low) | t_high.lt(t_near));
         let mask = S::D4::splat(0.0).lt(det_error) & !(outside | beyond);
         let inside = uv_error.lt(low) | high.lt(-uv_error);
-        let sure = solid & inside & ray.t_near.le(t_low) & t_high.le(ray.t_far);
+        let sure = solid & inside & t_near.le(t_low) & t_high.le(t_far);
         Evaluated { mask, sure, rows: [t_low, t_high, inv_det, u, v, det_error, uv_error] }
     }
 
@@ -123,13 +126,13 @@ impl TriBlock {
     pub(super) fn closest<S: Simd, C: Counter, K: HitSink>(
         &self,
         ray: &TravRay,
-        block_ray: &BlockRay<S>,
+        block_ray: &BlockRay,
         best: &mut Closest,
         sink: &K,
         count: &mut C,
     ) {
         count.block();
-        let evaluated = self.evaluate(block_ray, best.t_high());
+        let evaluated = self.evaluate::<S>(block_ray, best.t_high());
         if evaluated.mask == 0 {
             return;
         }
@@ -152,12 +155,12 @@ impl TriBlock {
     pub(super) fn occluded<S: Simd, C: Counter, K: HitSink>(
         &self,
         ray: &TravRay,
-        block_ray: &BlockRay<S>,
+        block_ray: &BlockRay,
         sink: &K,
         count: &mut C,
     ) -> bool {
         count.block();
-        let evaluated = self.evaluate(block_ray, f64::from(ray.range().t_far));
+        let evaluated = self.evaluate::<S>(block_ray, f64::from(ray.range().t_far));
         if evaluated.mask == 0 {
             return false;
         }
@@ -187,29 +190,27 @@ impl TriBlock {
     }
 }
 
-/// A ray spread over the lanes of a block.
+/// A ray in f64. Numbers are spread over lanes where they are used: that is a load, and most rays test few blocks.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct BlockRay<S: Simd> {
-    origin: [S::D4; 3],
-    dir: [S::D4; 3],
+pub(super) struct BlockRay {
+    origin: [f64; 3],
+    dir: [f64; 3],
     /// `BOUND * |dir|∞`.
-    reach: S::D4,
-    t_near: S::D4,
-    t_far: S::D4,
+    reach: f64,
+    t_near: f64,
+    t_far: f64,
 }
 
-impl<S: Simd> BlockRay<S> {
+impl BlockRay {
     #[inline(always)]
     pub(super) fn new(ray: &TravRay) -> Self {
         let range = ray.range();
-        let spread = |c: f32| S::D4::splat(f64::from(c));
-        let reach = BOUND * f64::from(range.dir.abs().max_element());
         Self {
-            origin: range.origin.to_array().map(spread),
-            dir: range.dir.to_array().map(spread),
-            reach: S::D4::splat(reach),
-            t_near: spread(range.t_near),
-            t_far: spread(range.t_far),
+            origin: range.origin.to_array().map(f64::from),
+            dir: range.dir.to_array().map(f64::from),
+            reach: BOUND * f64::from(range.dir.abs().max_element()),
+            t_near: f64::from(range.t_near),
+            t_far: f64::from(range.t_far),
         }
     }
 }

@@ -179,9 +179,15 @@ impl Closest {
     /// Keeps `hit`, which lies in the ray's range, when it beats the best and `sink` accepts it.
     #[inline(always)]
     pub fn keep<K: HitSink>(&mut self, hit: TriangleHit, ray: &TravRay, prim: PrimId, sink: &K) {
-        let surely_first = self.best.is_none() || hit.t_high < self.t_low;
-        if !surely_first && (hit.t_low > self.t_high || !self.wins_exactly(&hit, ray, prim, sink)) {
-            return;
+        if self.best.is_some() && hit.t_high >= self.t_low {
+            if hit.t_low > self.t_high {
+                return;
+            }
+            // A copy, so that the hit itself can stay in registers.
+            let copy = hit;
+            if !self.wins_exactly(&copy, ray, prim, sink) {
+                return;
+            }
         }
         let (instance, prim) = sink.key(prim);
         if !K::ACCEPTS_ALL && !sink.accept(&rounded(&hit, ray, instance, prim)) {

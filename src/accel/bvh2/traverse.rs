@@ -248,13 +248,13 @@ impl Bvh2 {
         sink: &K,
         count: &mut C,
     ) {
-        let block_ray = BlockRay::<S>::new(ray);
+        let block_ray = BlockRay::new(ray);
         let mut stack = Stack::new(N::ZERO);
         let mut link = Link::inner(0);
         loop {
             if link.is_leaf() {
                 for block in &self.blocks[link.leaf_blocks()] {
-                    block.closest(ray, &block_ray, best, sink, count);
+                    block.closest::<S, C, K>(ray, &block_ray, best, sink, count);
                 }
                 test.limit(best);
             } else {
@@ -300,13 +300,13 @@ impl Bvh2 {
         sink: &K,
         count: &mut C,
     ) -> bool {
-        let block_ray = BlockRay::<S>::new(ray);
+        let block_ray = BlockRay::new(ray);
         let mut stack = Stack::new(());
         let mut link = Link::inner(0);
         loop {
             if link.is_leaf() {
                 for block in &self.blocks[link.leaf_blocks()] {
-                    if block.occluded(ray, &block_ray, sink, count) {
+                    if block.occluded::<S, C, K>(ray, &block_ray, sink, count) {
                         return true;
                     }
                 }

@@ -98,7 +98,11 @@ impl TriangleHit {
         let t = agreed(self.t_low, self.t_high);
         match (t, agreed(u - u_error, u + u_error), agreed(v - v_error, v + v_error)) {
             (Some(t), Some(u), Some(v)) => [t, u, v],
-            _ => self.tuv_exactly(ray),
+            _ => {
+                // A copy, so that the hit itself can stay in registers.
+                let copy = *self;
+                copy.tuv_exactly(ray)
+            }
         }
     }
 
