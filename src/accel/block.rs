@@ -55,6 +55,18 @@ impl TriBlock {
         self.corners.map(|[x, y, z]| Vec3::new(x[lane], y[lane], z[lane]))
     }
 
+    /// Number of the triangle in a lane, or [`NO_PRIM`].
+    #[inline(always)]
+    pub(super) fn prim(&self, lane: usize) -> u32 {
+        self.prims[lane]
+    }
+
+    /// The corners in f64.
+    #[inline(always)]
+    pub(super) fn widened<S: Simd>(&self) -> [D3<S>; 3] {
+        self.corners.map(|corner| corner.map(|axis| S::widen(S::F4::load(&axis))))
+    }
+
     /// Takes the corners from `prims` and returns the box around them.
     #[inline(always)]
     pub(super) fn refit(&mut self, prims: &Triangles<'_>) -> BlockBounds {
@@ -91,8 +103,7 @@ impl TriBlock {
     /// `[t_near, t_limit]`, are not in the mask; `t_limit` is at most the ray's end.
     #[inline(always)]
     fn evaluate<S: Simd>(&self, ray: &BlockRay, t_limit: f64) -> Evaluated<S> {
-        let corner = |k: usize| self.corners[k].map(|axis| S::widen(S::F4::load(&axis)));
-        let (v0, v1, v2) = (corner(0), corner(1), corner(2));
+        let [v0, v1, v2] = self.widened::<S>();
         let (origin, dir) = (ray.origin.map(S::D4::splat), ray.dir.map(S::D4::splat));
         let (e1, e2, s) = (sub::<S>(v1, v0), sub::<S>(v2, v0), sub::<S>(origin, v0));
         let (p, q) = (cross::<S>(dir, e2), cross::<S>(s, e1));
@@ -184,7 +195,7 @@ impl TriBlock {
 
     #[cold]
     #[inline(never)]
-    fn blocks_exactly<K: HitSink>(&self, ray: &TravRay, lane: usize, sink: &K) -> bool {
+    pub(super) fn blocks_exactly<K: HitSink>(&self, ray: &TravRay, lane: usize, sink: &K) -> bool {
         let hit = TriangleHit::exactly(ray.range(), self.corners(lane));
         hit.is_some_and(|hit| blocks(&hit, ray, PrimId(self.prims[lane]), sink))
     }
@@ -246,25 +257,25 @@ impl Spilled {
     }
 }
 
-type D3<S> = [<S as Simd>::D4; 3];
+pub(super) type D3<S> = [<S as Simd>::D4; 3];
 
 #[inline(always)]
-fn sub<S: Simd>(a: D3<S>, b: D3<S>) -> D3<S> {
+pub(super) fn sub<S: Simd>(a: D3<S>, b: D3<S>) -> D3<S> {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 
 #[inline(always)]
-fn cross<S: Simd>(a: D3<S>, b: D3<S>) -> D3<S> {
+pub(super) fn cross<S: Simd>(a: D3<S>, b: D3<S>) -> D3<S> {
     let minor = |i: usize, j: usize| a[i].mul_sub_loose(b[j], a[j] * b[i]);
     [minor(1, 2), minor(2, 0), minor(0, 1)]
 }
 
 #[inline(always)]
-fn dot<S: Simd>(a: D3<S>, b: D3<S>) -> S::D4 {
+pub(super) fn dot<S: Simd>(a: D3<S>, b: D3<S>) -> S::D4 {
     a[0].mul_add_loose(b[0], a[1].mul_add_loose(b[1], a[2] * b[2]))
 }
 
 #[inline(always)]
-fn norm1<S: Simd>(a: D3<S>) -> S::D4 {
+pub(super) fn norm1<S: Simd>(a: D3<S>) -> S::D4 {
     a[0].abs() + a[1].abs() + a[2].abs()
 }

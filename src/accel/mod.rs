@@ -3,10 +3,12 @@
 mod block;
 pub mod bvh2;
 pub mod list;
+mod packet;
 mod query;
 mod registry;
 mod sah;
 
+pub use packet::PACKET;
 pub use query::{AnyHit, Closest, HitSink, TravRay};
 pub use registry::{AccelKind, AccelSpec, AnyAccel, SpecError};
 
@@ -138,6 +140,39 @@ pub trait Accel: Sized + Clone + Send + Sync + std::fmt::Debug + 'static {
         sink: &K,
         count: &mut C,
     ) -> bool;
+
+    /// As [`Accel::closest`] for each ray whose bit is set in `active`; `best` and `sinks` go with the rays.
+    ///
+    /// At most [`PACKET`] rays. Those close together, with directions of the same signs, are walked together where the
+    /// structure can; the answers are those of single rays.
+    #[inline(always)]
+    fn closest_packet<S: Simd, C: Counter, K: HitSink>(
+        &self,
+        prims: &Triangles<'_>,
+        rays: &[TravRay],
+        active: u32,
+        best: &mut [Closest],
+        sinks: &[K],
+        count: &mut C,
+    ) {
+        for i in packet::bits(active) {
+            self.closest::<S, C, K>(prims, &rays[i], &mut best[i], &sinks[i], count);
+        }
+    }
+
+    /// As [`Accel::occluded`] for each ray whose bit is set in `active`: the bits of those that are blocked.
+    #[inline(always)]
+    fn occluded_packet<S: Simd, C: Counter, K: HitSink>(
+        &self,
+        prims: &Triangles<'_>,
+        rays: &[TravRay],
+        active: u32,
+        sinks: &[K],
+        count: &mut C,
+    ) -> u32 {
+        packet::bits(active)
+            .fold(0, |blocked, i| blocked | u32::from(self.occluded::<S, C, K>(prims, &rays[i], &sinks[i], count)) << i)
+    }
 
     /// Checks every invariant against `prims`.
     ///

@@ -43,7 +43,7 @@ impl HitSink for AnyHit {
 pub(super) const ORDINARY_MAX: f32 = 1_152_921_504_606_846_976.0;
 
 /// Relative widening of reciprocals: 6 * 2^-24, see [`TravRay::inv_near`].
-const WIDEN: f32 = 6.0 / 16_777_216.0;
+pub(super) const WIDEN: f32 = 6.0 / 16_777_216.0;
 
 /// A ray with what traversals derive from it, made once a ray.
 #[derive(Clone, Copy, Debug)]

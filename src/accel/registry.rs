@@ -152,6 +152,37 @@ macro_rules! register_accels {
                 }
             }
 
+            /// As [`Accel::closest_packet`].
+            #[inline(always)]
+            pub fn closest_packet<S: Simd, C: Counter, K: HitSink>(
+                &self,
+                prims: &Triangles<'_>,
+                rays: &[TravRay],
+                active: u32,
+                best: &mut [Closest],
+                sinks: &[K],
+                count: &mut C,
+            ) {
+                match self {
+                    $(Self::$kind(a) => a.closest_packet::<S, C, K>(prims, rays, active, best, sinks, count),)*
+                }
+            }
+
+            /// As [`Accel::occluded_packet`].
+            #[inline(always)]
+            pub fn occluded_packet<S: Simd, C: Counter, K: HitSink>(
+                &self,
+                prims: &Triangles<'_>,
+                rays: &[TravRay],
+                active: u32,
+                sinks: &[K],
+                count: &mut C,
+            ) -> u32 {
+                match self {
+                    $(Self::$kind(a) => a.occluded_packet::<S, C, K>(prims, rays, active, sinks, count),)*
+                }
+            }
+
             /// As [`Accel::validate`].
             ///
             /// # Errors

@@ -2,7 +2,7 @@
 #![allow(dead_code, reason = "each test file uses its share")]
 
 use kinora::{
-    accel::{AnyAccel, AnyHit, Closest, TravRay},
+    accel::{AnyAccel, AnyHit, Closest, PACKET, TravRay},
     geom::{Hit, PrimId, Ray, Triangles},
     glam::Vec3,
     simd::{Simd, SimdLevel, Task, dispatch},
@@ -78,6 +78,47 @@ impl Task for OccludedTask<'_> {
 /// Whether every ray is blocked.
 pub fn occluded(accel: &AnyAccel, prims: &Triangles<'_>, rays: &[Ray], level: SimdLevel) -> Vec<bool> {
     dispatch(level, OccludedTask(ClosestTask { accel, prims: *prims, rays }))
+}
+
+struct PacketTask<'a>(ClosestTask<'a>);
+
+impl Task for PacketTask<'_> {
+    type Output = (Vec<Option<Hit>>, Vec<bool>);
+
+    #[inline(always)]
+    fn run<S: Simd>(self) -> Self::Output {
+        let ClosestTask { accel, prims, rays } = self.0;
+        let (mut hits, mut blocked) = (Vec::new(), Vec::new());
+        // Packets of every length up to the longest; rays that are none are left out of the active ones.
+        let mut rest = rays;
+        let mut len = 0;
+        while !rest.is_empty() {
+            len = len % PACKET + 1;
+            let (part, tail) = rest.split_at(len.min(rest.len()));
+            rest = tail;
+            let usable: Vec<_> = part.iter().map(TravRay::new).collect();
+            let spare = TravRay::new(&Ray::new(Vec3::ZERO, Vec3::X)).expect("a ray");
+            let packet: Vec<_> = usable.iter().map(|r| r.unwrap_or(spare)).collect();
+            let active = usable.iter().enumerate().fold(0, |bits, (i, r)| bits | (u32::from(r.is_some()) << i));
+            let mut best: Vec<_> = packet.iter().map(Closest::new).collect();
+            let sinks = vec![AnyHit; packet.len()];
+            accel.closest_packet::<S, _, _>(&prims, &packet, active, &mut best, &sinks, &mut ());
+            let mask = accel.occluded_packet::<S, _, _>(&prims, &packet, active, &sinks, &mut ());
+            hits.extend(best.iter().zip(&packet).map(|(best, ray)| best.hit(ray)));
+            blocked.extend((0..packet.len()).map(|i| mask >> i & 1 == 1));
+        }
+        (hits, blocked)
+    }
+}
+
+/// Closest hits and occlusion of rays taken in packets of differing length.
+pub fn in_packets(
+    accel: &AnyAccel,
+    prims: &Triangles<'_>,
+    rays: &[Ray],
+    level: SimdLevel,
+) -> (Vec<Option<Hit>>, Vec<bool>) {
+    dispatch(level, PacketTask(ClosestTask { accel, prims: *prims, rays }))
 }
 
 /// A finite f32 as a rational.

@@ -9,6 +9,7 @@
 
 mod build;
 mod node;
+mod packet;
 mod refit;
 mod traverse;
 mod validate;
@@ -175,6 +176,31 @@ impl Accel for Bvh2 {
         count: &mut C,
     ) -> bool {
         self.walk_occluded::<S, C, K>(ray, sink, count)
+    }
+
+    #[inline(always)]
+    fn closest_packet<S: Simd, C: Counter, K: HitSink>(
+        &self,
+        prims: &Triangles<'_>,
+        rays: &[TravRay],
+        active: u32,
+        best: &mut [Closest],
+        sinks: &[K],
+        count: &mut C,
+    ) {
+        self.walk_closest_packet::<S, C, K>(prims, rays, active, best, sinks, count);
+    }
+
+    #[inline(always)]
+    fn occluded_packet<S: Simd, C: Counter, K: HitSink>(
+        &self,
+        prims: &Triangles<'_>,
+        rays: &[TravRay],
+        active: u32,
+        sinks: &[K],
+        count: &mut C,
+    ) -> u32 {
+        self.walk_occluded_packet::<S, C, K>(prims, rays, active, sinks, count)
     }
 
     fn validate(&self, prims: &Triangles<'_>) -> Result<(), Violation> {

@@ -1,3 +1,5 @@
+use arrayvec::ArrayVec;
+
 use super::{
     Bvh2, MAX_DEPTH,
     node::{Link, Pair},
@@ -8,39 +10,16 @@ use crate::{
 };
 
 /// Absolute slack of the f32 node test: above every underflow it may meet.
-const SLACK: f32 = f32::MIN_POSITIVE;
+pub(super) const SLACK: f32 = f32::MIN_POSITIVE;
 
 /// Far children to visit: a link and a lower bound of the t at which the ray enters.
 ///
-/// A walk keeps at most one entry a level and the builder bounds the depth, so the array cannot overflow.
-struct Stack<T> {
-    entries: [(Link, T); MAX_DEPTH],
-    len: usize,
-}
-
-impl<T: Copy> Stack<T> {
-    #[inline(always)]
-    fn new(zero: T) -> Self {
-        Self { entries: [(Link::NONE, zero); MAX_DEPTH], len: 0 }
-    }
-
-    #[inline(always)]
-    fn push(&mut self, link: Link, t_entry: T) {
-        self.entries[self.len] = (link, t_entry);
-        self.len += 1;
-    }
-
-    #[inline(always)]
-    fn pop(&mut self) -> Option<(Link, T)> {
-        self.len = self.len.checked_sub(1)?;
-        Some(self.entries[self.len])
-    }
-}
+/// A walk keeps at most one entry a level and the builder bounds the depth, so it cannot overflow.
+type Stack<T> = ArrayVec<(Link, T), MAX_DEPTH>;
 
 /// A way to test a pair of nodes: by f32 vectors for ordinary rays, by f64 scalars for all.
 trait NodeTest: Copy {
     type T: Copy + PartialOrd;
-    const ZERO: Self::T;
 
     /// Bits of the children whose boxes the ray may meet before the limit, and where it enters each, rounded down.
     fn test(&self, pair: &Pair) -> (u32, [Self::T; 2]);
@@ -95,7 +74,6 @@ impl<S: Simd> FastNode<S> {
 
 impl<S: Simd> NodeTest for FastNode<S> {
     type T = f32;
-    const ZERO: f32 = 0.0;
 
     #[inline(always)]
     fn test(&self, pair: &Pair) -> (u32, [f32; 2]) {
@@ -160,7 +138,6 @@ impl WideNode {
 
 impl NodeTest for WideNode {
     type T = f64;
-    const ZERO: f64 = 0.0;
 
     fn test(&self, pair: &Pair) -> (u32, [f64; 2]) {
         let ((hit0, t0), (hit1, t1)) = (self.test_child(pair, 0), self.test_child(pair, 1));
@@ -186,7 +163,7 @@ fn predicted(link: Link) -> Link {
 impl Bvh2 {
     /// True when f32 node tests are proven for this ray and these boxes.
     #[inline(always)]
-    fn is_ordinary(&self, ray: &TravRay) -> bool {
+    pub(super) fn is_ordinary(&self, ray: &TravRay) -> bool {
         ray.is_ordinary() && self.reach <= ORDINARY_MAX
     }
 
@@ -249,7 +226,7 @@ impl Bvh2 {
         count: &mut C,
     ) {
         let block_ray = BlockRay::new(ray);
-        let mut stack = Stack::new(N::ZERO);
+        let mut stack = Stack::<N::T>::new();
         let mut link = Link::inner(0);
         loop {
             if link.is_leaf() {
@@ -264,10 +241,10 @@ impl Bvh2 {
                 let [first, second] = pair.links;
                 if hits == 3 {
                     if entries[0] <= entries[1] {
-                        stack.push(second, entries[1]);
+                        stack.push((second, entries[1]));
                         link = predicted(first);
                     } else {
-                        stack.push(first, entries[0]);
+                        stack.push((first, entries[0]));
                         link = predicted(second);
                     }
                     continue;
@@ -301,7 +278,7 @@ impl Bvh2 {
         count: &mut C,
     ) -> bool {
         let block_ray = BlockRay::new(ray);
-        let mut stack = Stack::new(());
+        let mut stack = Stack::<()>::new();
         let mut link = Link::inner(0);
         loop {
             if link.is_leaf() {
@@ -317,10 +294,10 @@ impl Bvh2 {
                 let [first, second] = pair.links;
                 if hits == 3 {
                     if entries[0] <= entries[1] {
-                        stack.push(second, ());
+                        stack.push((second, ()));
                         link = predicted(first);
                     } else {
-                        stack.push(first, ());
+                        stack.push((first, ()));
                         link = predicted(second);
                     }
                     continue;
