@@ -37,7 +37,7 @@ pub enum ChannelTarget {
     Scale(NodeId),
     /// A node's morph weights.
     Weights(NodeId),
-    /// The default morph weights of a mesh (KHR_animation_pointer `/meshes/M/weights`).
+    /// The default morph weights of a mesh (`KHR_animation_pointer` `/meshes/M/weights`).
     MeshWeights(MeshId),
 }
 

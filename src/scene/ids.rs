@@ -31,6 +31,6 @@ ids! {
     ImageId;
     /// A camera's glTF index.
     CameraId;
-    /// A light's index in KHR_lights_punctual.
+    /// A light's index in `KHR_lights_punctual`.
     LightId;
 }

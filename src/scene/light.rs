@@ -1,6 +1,6 @@
 use glam::Vec3;
 
-/// A light of KHR_lights_punctual; it shines along the node's -Z.
+/// A light of `KHR_lights_punctual`; it shines along the node's -Z.
 #[derive(Clone, Debug)]
 pub struct Light {
     /// Name, empty when the file has none.

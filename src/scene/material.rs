@@ -25,7 +25,7 @@ pub struct Material {
     pub occlusion_texture: Option<TextureRef>,
     /// Strength of the occlusion in [0, 1].
     pub occlusion_strength: f32,
-    /// Linear emitted radiance, KHR_materials_emissive_strength applied.
+    /// Linear emitted radiance, `KHR_materials_emissive_strength` applied.
     pub emissive: Vec3,
     /// Emission texture (sRGB).
     pub emissive_texture: Option<TextureRef>,
@@ -33,7 +33,7 @@ pub struct Material {
     pub alpha_mode: AlphaMode,
     /// Both faces are drawn.
     pub double_sided: bool,
-    /// KHR_materials_unlit: base colour is the answer.
+    /// `KHR_materials_unlit`: base colour is the answer.
     pub unlit: bool,
 }
 
@@ -73,7 +73,7 @@ pub enum AlphaMode {
     Blend,
 }
 
-/// A texture with the coordinates it is read at (KHR_texture_transform applied as
+/// A texture with the coordinates it is read at (`KHR_texture_transform` applied as
 /// `uv' = offset + rotate(rotation) * (scale * uv)`).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TextureRef {
@@ -83,7 +83,7 @@ pub struct TextureRef {
     pub tex_coord: u32,
     /// Offset.
     pub offset: Vec2,
-    /// Rotation in radians as KHR_texture_transform defines it.
+    /// Rotation in radians as `KHR_texture_transform` defines it.
     pub rotation: f32,
     /// Scale.
     pub scale: Vec2,

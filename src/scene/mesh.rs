@@ -39,11 +39,11 @@ pub struct MeshPart {
     pub normals: Vec<Vec3>,
     /// Tangents; `w` is the sign of the bitangent.
     pub tangents: Vec<Vec4>,
-    /// Texture coordinates by set: TEXCOORD_0, TEXCOORD_1, ...
+    /// Texture coordinates by set: `TEXCOORD_0`, `TEXCOORD_1`, ...
     pub tex_coords: Vec<Vec<Vec2>>,
-    /// Linear vertex colours with alpha (COLOR_0).
+    /// Linear vertex colours with alpha (`COLOR_0`).
     pub colors: Vec<Vec4>,
-    /// Joints and weights; `None` without JOINTS_0.
+    /// Joints and weights; `None` without `JOINTS_0`.
     pub influences: Option<Influences>,
     /// Morph targets.
     pub targets: Vec<MorphTarget>,
@@ -51,7 +51,7 @@ pub struct MeshPart {
     pub material: Option<MaterialId>,
 }
 
-/// Joint influences of a part's vertices, all JOINTS_n / WEIGHTS_n sets together.
+/// Joint influences of a part's vertices, all `JOINTS_n` / `WEIGHTS_n` sets together.
 #[derive(Clone, Debug, Default)]
 pub struct Influences {
     /// Influences a vertex: 4 times the number of sets.

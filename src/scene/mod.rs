@@ -35,7 +35,7 @@ pub struct PartInstance {
     pub mesh: MeshId,
     /// The part (glTF primitive) within the mesh.
     pub part: u32,
-    /// The copy's number under EXT_mesh_gpu_instancing, else `None`.
+    /// The copy's number under `EXT_mesh_gpu_instancing`, else `None`.
     pub copy: Option<u32>,
 }
 

@@ -48,6 +48,6 @@ pub struct SceneNode {
     pub light: Option<LightId>,
     /// Default morph weights of this node, before those of the mesh.
     pub weights: Option<Vec<f32>>,
-    /// Copies of the mesh under EXT_mesh_gpu_instancing: `node_from_copy` transforms.
+    /// Copies of the mesh under `EXT_mesh_gpu_instancing`: `node_from_copy` transforms.
     pub copies: Option<Vec<Trs>>,
 }

@@ -182,22 +182,7 @@ impl Context<'_> {
         let view_place = format!("{place}.bufferView");
         let bytes = self.buffers.view(self.doc, view.index(), self.budget, &view_place)?;
         let offset = accessor.byte_offset.map_or(0, json::Size::get);
-        self.window(bytes, offset, layout, &place).map(Some)
-    }
-
-    fn window<'b>(&self, bytes: &'b [u8], offset: usize, layout: &Layout, place: &str) -> Step<&'b [u8]> {
-        let span = layout.span();
-        let end = span.and_then(|span| offset.checked_add(span));
-        match end {
-            Some(end) if end <= bytes.len() => Ok(&bytes[offset..end]),
-            _ => {
-                let (count, size) = (layout.count, bytes.len());
-                let reason = format!(
-                    "{count} elements from byte {offset} on go past the end of their bufferView ({size} bytes)"
-                );
-                Err(Problem::at(place, reason))
-            }
-        }
+        window(bytes, offset, layout, &place).map(Some)
     }
 
     /// Checks an accessor's format and extent without reading it.
@@ -293,7 +278,7 @@ impl Context<'_> {
         let view = sparse.values.buffer_view.index();
         let bytes = self.buffers.view(self.doc, view, self.budget, &format!("{values_place}.bufferView"))?;
         let values = Layout { count, stride: layout.element, ..*layout };
-        let values = self.window(bytes, sparse.values.byte_offset.get(), &values, &values_place)?;
+        let values = window(bytes, sparse.values.byte_offset.get(), &values, &values_place)?;
         Ok(Some(SparsePart { indices, values }))
     }
 
@@ -309,7 +294,7 @@ impl Context<'_> {
             Layout { component, kind: AccessorType::Scalar, normalized: false, count, stride: size, element: size };
         let view = at.buffer_view.index();
         let bytes = self.buffers.view(self.doc, view, self.budget, &format!("{place}.bufferView"))?;
-        let bytes = self.window(bytes, at.byte_offset.get(), &layout, &place)?;
+        let bytes = window(bytes, at.byte_offset.get(), &layout, &place)?;
         self.budget.take(count, 4, &place)?;
         let mut indices = vec![0; count];
         each_unsigned(&layout, bytes, |i, v| indices[i] = v);
@@ -321,6 +306,17 @@ impl Context<'_> {
         }
         Ok(indices)
     }
+}
+
+/// The bytes of a view that a layout covers from `offset` on.
+fn window<'b>(bytes: &'b [u8], offset: usize, layout: &Layout, place: &str) -> Step<&'b [u8]> {
+    let covered = layout.span().and_then(|span| bytes.get(offset..)?.get(..span));
+    covered.ok_or_else(|| {
+        let (count, size) = (layout.count, bytes.len());
+        let reason =
+            format!("{count} elements from byte {offset} on go past the end of their bufferView ({size} bytes)");
+        Problem::at(place, reason)
+    })
 }
 
 struct SparsePart<'b> {

@@ -89,7 +89,7 @@ fn orthographic(cx: &Context<'_>, source: &json::Orthographic, place: &str) -> P
     }
 }
 
-/// All lights of KHR_lights_punctual.
+/// All lights of `KHR_lights_punctual`.
 pub(super) fn import_lights(cx: &Context<'_>) -> Step<Vec<Light>> {
     cx.budget.take(cx.doc.lights().len(), size_of::<Light>(), "extensions.KHR_lights_punctual.lights")?;
     cx.doc.lights().iter().enumerate().map(|(i, source)| light(cx, i, source)).collect()
@@ -126,7 +126,6 @@ fn spot(cx: &Context<'_>, source: Option<&json::Spot>, place: &str) -> LightKind
     let inner = source.and_then(|s| s.inner_cone_angle).map_or(0.0, to_f32);
     let fixed_outer = outer.clamp(1e-3, std::f32::consts::FRAC_PI_2);
     let fixed_inner = inner.clamp(0.0, fixed_outer);
-    #[expect(clippy::float_cmp, reason = "asks whether the clamp changed anything")]
     if (inner, outer) != (fixed_inner, fixed_outer) {
         cx.warnings.add(place, format_args!("cone angles {inner} and {outer} are out of range; clamped"));
     }

@@ -57,48 +57,37 @@ impl ClipImporter<'_> {
         Clip { disabled: Some(format!("{}: {}", problem.place(), problem.reason())), ..clip }
     }
 
-    fn channels(&mut self, animation: &Animation, place: &str) -> Step<ClipParts> {
+    fn channels(&mut self, animation: &Animation, clip_place: &str) -> Step<ClipParts> {
         let mut parts = ClipParts::default();
         let mut inputs = Vec::with_capacity(animation.samplers.len());
         for (i, sampler) in animation.samplers.iter().enumerate() {
-            let place = format!("{place}.samplers[{i}]");
+            let place = format!("{clip_place}.samplers[{i}]");
             let input = self.input(sampler, &place)?;
             parts.duration_s = input.times.last().map_or(parts.duration_s, |&t| parts.duration_s.max(f64::from(t)));
             inputs.push(input);
         }
         if animation.channels.is_empty() || animation.samplers.is_empty() {
-            return Err(Problem::at(place, "has no channel or no sampler"));
+            return Err(Problem::at(clip_place, "has no channel or no sampler"));
         }
         let mut made: HashMap<(usize, usize), u32> = HashMap::new();
-        let mut driven: HashMap<ChannelTarget, usize> = HashMap::new();
         for (i, channel) in animation.channels.iter().enumerate() {
-            let place = format!("{place}.channels[{i}]");
+            let place = format!("{clip_place}.channels[{i}]");
             let sampler = channel.sampler.index();
             check_index(sampler, inputs.len(), format_args!("{place}.sampler"), "sampler")?;
             let Some((target, width)) = self.target(&channel.target, &format!("{place}.target"))? else { continue };
-            let number = match made.get(&(sampler, width)) {
-                Some(&number) => number,
-                None => {
-                    let place = format!("{}.samplers[{sampler}]", place.rsplit_once(".channels").map_or("", |p| p.0));
-                    let source = &animation.samplers[sampler];
-                    parts.samplers.push(self.sampler(source, &inputs[sampler], target, width, &place)?);
-                    let number = u32::try_from(parts.samplers.len() - 1).unwrap_or(u32::MAX);
-                    made.insert((sampler, width), number);
-                    number
-                }
+            let number = if let Some(&number) = made.get(&(sampler, width)) {
+                number
+            } else {
+                let place = format!("{clip_place}.samplers[{sampler}]");
+                let source = &animation.samplers[sampler];
+                parts.samplers.push(self.sampler(source, &inputs[sampler], target, width, &place)?);
+                let number = u32::try_from(parts.samplers.len() - 1).unwrap_or(u32::MAX);
+                made.insert((sampler, width), number);
+                number
             };
-            let channel = Channel { sampler: number, target };
-            match driven.get(&target) {
-                Some(&earlier) => {
-                    self.cx
-                        .warnings
-                        .add(format_args!("{place}.target"), "is driven by an earlier channel too; this one counts");
-                    parts.channels[earlier] = channel;
-                }
-                None => {
-                    driven.insert(target, parts.channels.len());
-                    parts.channels.push(channel);
-                }
+            if !parts.add(Channel { sampler: number, target }) {
+                let text = "is driven by an earlier channel too; this one counts";
+                self.cx.warnings.add(format_args!("{place}.target"), text);
             }
         }
         Ok(parts)
@@ -195,13 +184,11 @@ impl ClipImporter<'_> {
             if target.node.is_some() {
                 self.cx.warnings.add(place, "has a node beside its pointer; the pointer counts");
             }
-            return match pointer::parse(pointer) {
-                Some(target) => self.checked(target, place),
-                None => {
-                    self.ignored_pointers.push(format!("{place}: {}", super::uri::shorten(pointer)));
-                    Ok(None)
-                }
+            let Some(target) = pointer::parse(pointer) else {
+                self.ignored_pointers.push(format!("{place}: {}", super::uri::shorten(pointer)));
+                return Ok(None);
             };
+            return self.checked(target, place);
         }
         let Some(node) = target.node else { return Ok(None) };
         let node = NodeId(node.0);
@@ -263,6 +250,22 @@ struct ClipParts {
     channels: Vec<Channel>,
     samplers: Vec<Sampler>,
     duration_s: f64,
+    /// Which channel drives a target.
+    driven: HashMap<ChannelTarget, usize>,
+}
+
+impl ClipParts {
+    /// Adds a channel; false when it replaces an earlier one with the same target.
+    fn add(&mut self, channel: Channel) -> bool {
+        let last = self.channels.len();
+        let place = *self.driven.entry(channel.target).or_insert(last);
+        if place == last {
+            self.channels.push(channel);
+        } else {
+            self.channels[place] = channel;
+        }
+        place == last
+    }
 }
 
 struct Input {

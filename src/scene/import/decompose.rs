@@ -1,12 +1,12 @@
 //! A matrix as translation, rotation and scale, where it is one.
 
-use glam::{DMat3, DMat4, DQuat, DVec3};
+use glam::{DMat3, DMat4, DQuat, DVec3, DVec4};
 
 use super::super::Trs;
 
 /// The parts of a matrix; `None` when it shears or flattens. A reflection becomes a negative x scale.
 pub(super) fn decompose(matrix: &DMat4) -> Option<Trs> {
-    let [x, y, z] = [matrix.x_axis, matrix.y_axis, matrix.z_axis].map(|axis| axis.truncate());
+    let [x, y, z] = [matrix.x_axis, matrix.y_axis, matrix.z_axis].map(DVec4::truncate);
     let mut scale = DVec3::new(x.length(), y.length(), z.length());
     if !(scale.is_finite() && scale.min_element() > 0.0) {
         return None;

@@ -27,8 +27,9 @@ fn is_honoured(extension: &str) -> bool {
 fn advice(extension: &str) -> &'static str {
     match extension {
         "KHR_draco_mesh_compression" => "export the file again without Draco compression, or with meshopt",
-        "KHR_texture_basisu" => "export the file again with PNG, JPEG or WebP textures",
-        "MSFT_texture_dds" | "EXT_texture_avif" => "export the file again with PNG, JPEG or WebP textures",
+        "KHR_texture_basisu" | "MSFT_texture_dds" | "EXT_texture_avif" => {
+            "export the file again with PNG, JPEG or WebP textures"
+        }
         "KHR_materials_pbrSpecularGlossiness" => "convert the materials to metallic-roughness",
         _ => "export the file again without it",
     }

@@ -43,7 +43,9 @@ pub(super) fn eval_order(nodes: &[SceneNode]) -> Step<Vec<NodeId>> {
         return Ok(order);
     }
     let mut reached = vec![false; nodes.len()];
-    order.iter().for_each(|n| reached[n.index()] = true);
+    for node in &order {
+        reached[node.index()] = true;
+    }
     let lost = reached.iter().position(|&r| !r).unwrap_or(0);
     // Every node that no root reaches has a parent, and walking up from it ends in the cycle.
     let mut seen = vec![false; nodes.len()];

@@ -28,7 +28,9 @@ pub(super) fn import(cx: &Context<'_>, files: &mut Files<'_>) -> Step<(Vec<Image
     let mut decoded: Vec<Option<Result<Arc<[u8]>, String>>> = sources.iter().map(|_| None).collect();
     for batch in batches(&sources) {
         let pixels: Vec<_> = batch.par_iter().map(|&i| (i, sources[i].decode())).collect();
-        pixels.into_iter().for_each(|(i, result)| decoded[i] = Some(result));
+        for (i, result) in pixels {
+            decoded[i] = Some(result);
+        }
     }
     let mut readable = vec![false; sources.len()];
     let mut images = Vec::with_capacity(sources.len());
@@ -156,15 +158,12 @@ fn batches(sources: &[Source<'_>]) -> Vec<Vec<usize>> {
     let mut room = 0;
     for (i, source) in sources.iter().enumerate() {
         let Ok(found) = &source.state else { continue };
-        match batches.last_mut().filter(|_| found.in_flight <= room) {
-            Some(batch) => {
-                room -= found.in_flight;
-                batch.push(i);
-            }
-            None => {
-                room = MAX_IN_FLIGHT.saturating_sub(found.in_flight);
-                batches.push(vec![i]);
-            }
+        if let Some(batch) = batches.last_mut().filter(|_| found.in_flight <= room) {
+            room -= found.in_flight;
+            batch.push(i);
+        } else {
+            room = MAX_IN_FLIGHT.saturating_sub(found.in_flight);
+            batches.push(vec![i]);
         }
     }
     batches

@@ -11,14 +11,14 @@ use super::{
     meshes::check_count,
 };
 
-/// All JOINTS_n / WEIGHTS_n sets, and the largest joint number that has weight.
+/// All `JOINTS_n` / `WEIGHTS_n` sets, and the largest joint number that has weight.
 pub(super) fn import(
     cx: &Context<'_>,
     attributes: &BTreeMap<String, Idx>,
     count: usize,
     place: &str,
 ) -> Step<(Option<Influences>, Option<u16>)> {
-    let sets = (0..).take_while(|n| attributes.contains_key(&format!("JOINTS_{n}"))).count();
+    let sets = (0..attributes.len()).take_while(|n| attributes.contains_key(&format!("JOINTS_{n}"))).count();
     for name in attributes.keys().filter(|n| n.starts_with("WEIGHTS_")) {
         if !attributes.contains_key(&name.replace("WEIGHTS", "JOINTS")) {
             cx.warnings.add(format_args!("{place}.attributes.{name}"), "has no joints beside it; ignored");

@@ -1,4 +1,4 @@
-//! EXT_mesh_gpu_instancing: the copies of a node's mesh.
+//! `EXT_mesh_gpu_instancing`: the copies of a node's mesh.
 
 use glam::{DQuat, DVec3, DVec4};
 

@@ -144,24 +144,11 @@ fn finite_vectors(cx: &Context<'_>, index: Idx, place: &str) -> Step<Vec<Vec3>> 
 }
 
 fn triangles(cx: &Context<'_>, source: &json::Primitive, mode: u32, count: usize, place: &str) -> Step<Vec<[u32; 3]>> {
-    let corners = match source.indices {
-        Some(index) => {
-            let place = format!("{place}.indices");
-            cx.accessor(index.index(), &place)?;
-            if cx.layout(index.index())?.kind != AccessorType::Scalar {
-                return Err(Problem::at(place, format!("accessors[{}] is not of SCALAR numbers", index.0)));
-            }
-            let corners = cx.unsigned(index.index(), &place)?;
-            if let Some(i) = corners.iter().position(|&c| c as usize >= count) {
-                let reason = format!("index number {i} is vertex {}, but there are {count} vertices", corners[i]);
-                return Err(Problem::at(place, reason));
-            }
-            corners
-        }
-        None => {
-            cx.budget.take(count, 4, place)?;
-            (0..u32::try_from(count).map_err(|_| Problem::at(place, "has more than 2^32 vertices"))?).collect()
-        }
+    let corners = if let Some(index) = source.indices {
+        corners(cx, index, count, &format!("{place}.indices"))?
+    } else {
+        cx.budget.take(count, 4, place)?;
+        (0..u32::try_from(count).map_err(|_| Problem::at(place, "has more than 2^32 vertices"))?).collect()
     };
     let whole = match mode {
         4 => corners.len() % 3 == 0,
@@ -173,6 +160,22 @@ fn triangles(cx: &Context<'_>, source: &json::Primitive, mode: u32, count: usize
     }
     cx.budget.take(corners.len(), if mode == 4 { 4 } else { 12 }, place)?;
     Ok(topology::triangles(mode, &corners))
+}
+
+/// The indices of a primitive, each below `count`.
+fn corners(cx: &Context<'_>, index: Idx, count: usize, place: &str) -> Step<Vec<u32>> {
+    cx.accessor(index.index(), place)?;
+    if cx.layout(index.index())?.kind != AccessorType::Scalar {
+        return Err(Problem::at(place, format!("accessors[{}] is not of SCALAR numbers", index.0)));
+    }
+    let corners = cx.unsigned(index.index(), place)?;
+    match corners.iter().position(|&c| c as usize >= count) {
+        Some(i) => {
+            let reason = format!("index number {i} is vertex {}, but there are {count} vertices", corners[i]);
+            Err(Problem::at(place, reason))
+        }
+        None => Ok(corners),
+    }
 }
 
 fn targets(cx: &Context<'_>, source: &json::Primitive, count: usize, place: &str) -> Step<Vec<MorphTarget>> {

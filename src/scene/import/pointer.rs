@@ -1,4 +1,4 @@
-//! JSON pointers of KHR_animation_pointer.
+//! JSON pointers of `KHR_animation_pointer`.
 
 use super::super::{ChannelTarget, MeshId, NodeId};
 

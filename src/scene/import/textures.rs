@@ -16,15 +16,12 @@ pub(super) fn import(cx: &Context<'_>, decoded: &[bool]) -> Step<Vec<Texture>> {
 
 fn import_texture(cx: &Context<'_>, index: usize, source: &json::Texture, decoded: &[bool]) -> Step<Texture> {
     let place = format!("textures[{index}]");
-    let image = match source.image() {
-        Some(image) => {
-            check_index(image.index(), cx.doc.images.len(), format_args!("{place}.source"), "image")?;
-            decoded[image.index()].then_some(ImageId(image.0))
-        }
-        None => {
-            cx.warnings.add(&place, "names no image in a format that can be read; drawn white");
-            None
-        }
+    let image = if let Some(image) = source.image() {
+        check_index(image.index(), cx.doc.images.len(), format_args!("{place}.source"), "image")?;
+        decoded[image.index()].then_some(ImageId(image.0))
+    } else {
+        cx.warnings.add(&place, "names no image in a format that can be read; drawn white");
+        None
     };
     let sampler = match source.sampler {
         Some(sampler) => {

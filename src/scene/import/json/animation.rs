@@ -37,7 +37,7 @@ struct Pointer {
 }
 
 impl AnimationTarget {
-    /// The JSON pointer of KHR_animation_pointer.
+    /// The JSON pointer of `KHR_animation_pointer`.
     pub(in super::super) fn pointer(&self) -> Option<&str> {
         self.extensions.as_ref().and_then(|e| e.pointer.as_ref()).map(|p| p.pointer.as_str())
     }

@@ -39,7 +39,7 @@ impl BufferView {
     }
 }
 
-/// EXT_meshopt_compression or KHR_meshopt_compression on a buffer view.
+/// `EXT_meshopt_compression` or `KHR_meshopt_compression` on a buffer view.
 #[derive(Debug, Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub(in super::super) struct MeshoptView {

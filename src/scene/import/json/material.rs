@@ -47,7 +47,7 @@ struct TextureInfoExtensions {
     transform: Option<TextureTransform>,
 }
 
-/// KHR_texture_transform.
+/// `KHR_texture_transform`.
 #[derive(Debug, Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub(in super::super) struct TextureTransform {
@@ -58,7 +58,7 @@ pub(in super::super) struct TextureTransform {
 }
 
 impl TextureInfo {
-    /// The texture coordinate set, that of KHR_texture_transform first.
+    /// The texture coordinate set, that of `KHR_texture_transform` first.
     pub(in super::super) fn set(&self) -> u32 {
         self.transform().and_then(|t| t.tex_coord).or(self.tex_coord).map_or(0, |set| set.0)
     }
@@ -84,7 +84,7 @@ struct EmissiveStrength {
     emissive_strength: Option<f64>,
 }
 
-/// KHR_materials_pbrSpecularGlossiness: read only where a material has nothing else.
+/// `KHR_materials_pbrSpecularGlossiness`: read only where a material has nothing else.
 #[derive(Debug, Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub(in super::super) struct SpecularGlossiness {

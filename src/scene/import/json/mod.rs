@@ -82,7 +82,7 @@ struct RootLights {
 }
 
 impl Document<'_> {
-    /// The lights of KHR_lights_punctual.
+    /// The lights of `KHR_lights_punctual`.
     pub(super) fn lights(&self) -> &[Light] {
         self.extensions.as_ref().and_then(|e| e.lights.as_ref()).map_or(&[], |l| &l.lights)
     }

@@ -40,7 +40,7 @@ struct NodeLight {
     light: Idx,
 }
 
-/// EXT_mesh_gpu_instancing on a node.
+/// `EXT_mesh_gpu_instancing` on a node.
 #[derive(Debug, Deserialize)]
 pub(in super::super) struct Instancing {
     #[serde(default)]

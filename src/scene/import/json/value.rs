@@ -12,7 +12,7 @@ fn whole(value: f64) -> Option<u64> {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked to be whole and small")]
     let whole = value as u64;
     #[expect(clippy::float_cmp, reason = "whole numbers below 2^53 are exact")]
-    (value >= 0.0 && value < 9.0e15 && whole as f64 == value).then_some(whole)
+    ((0.0..9.0e15).contains(&value) && whole as f64 == value).then_some(whole)
 }
 
 struct WholeVisitor;

@@ -1,5 +1,9 @@
 //! What is undone after the attribute codec.
-#![expect(clippy::cast_possible_truncation, reason = "values are rounded into the range of their type")]
+#![expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "values are rounded, and what lies outside the type's range saturates"
+)]
 
 /// A filter, checked against the stride.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,4 +1,4 @@
-//! Decoder of the buffer compression of EXT_meshopt_compression and KHR_meshopt_compression.
+//! Decoder of the buffer compression of `EXT_meshopt_compression` and `KHR_meshopt_compression`.
 //!
 //! Written from the extensions' normative appendices on bitstream and filters. Every read is checked; a
 //! stream that ends early, has bytes left, or refers to what was not yet written is an error.
@@ -60,7 +60,7 @@ pub(super) fn decode(
     let filter = Filter::named(filter.unwrap_or("NONE"), stride)?;
     let mut out = match mode {
         "ATTRIBUTES" => {
-            if stride == 0 || stride > 256 || stride % 4 != 0 {
+            if stride == 0 || stride > 256 || !stride.is_multiple_of(4) {
                 return Err(format!("byteStride {stride} is not a multiple of 4 up to 256"));
             }
             attributes::decode(data, count, stride)?
