@@ -1,8 +1,9 @@
 //! A frame's parts: `frame/<scene>/<accel>/advance` (pose, deform, refit, top level) and
-//! `frame/<scene>/<accel>/rays` (1280 x 720 primary rays, one a pixel, each hit followed by a shadow ray), on two threads.
+//! `frame/<scene>/<accel>/rays` (1280 x 720 primary rays, one a pixel, each hit followed by a shadow ray), on two
+//! threads. `KINORA_BENCH_FILES` may name further files, separated by colons.
 #![allow(missing_docs, reason = "a bench")]
 
-use std::{path::Path, sync::Arc};
+use std::{path::Path, sync::Arc, time::Instant};
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use kinora::{
@@ -19,7 +20,7 @@ use rayon::prelude::*;
 const SIZE: (u32, u32) = (1280, 720);
 
 /// The scenes that are there, each with the number of a clip.
-fn scenes() -> Vec<(&'static str, Scene, u32)> {
+fn scenes() -> Vec<(String, Scene, u32)> {
     let shared = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/assets"));
     let files = [
         ("man", "khronos/CesiumMan/glTF-Binary/CesiumMan.glb", 0),
@@ -27,9 +28,16 @@ fn scenes() -> Vec<(&'static str, Scene, u32)> {
         ("knight", "kaykit/Knight.glb", 72),
         ("truck", "khronos/CesiumMilkTruck/glTF-Binary/CesiumMilkTruck.glb", 0),
     ];
-    let own = builtin::names().iter().filter_map(|&name| Some((name, builtin::load(name).ok()?, 0)));
-    let shared = files.into_iter().filter_map(|(name, file, clip)| Some((name, import::from_path(&shared.join(file)).ok()?, clip)));
-    own.chain(shared).collect()
+    let own = builtin::names().iter().filter_map(|&name| Some((name.to_owned(), builtin::load(name).ok()?, 0)));
+    let shared = files
+        .into_iter()
+        .filter_map(|(name, file, clip)| Some((name.to_owned(), import::from_path(&shared.join(file)).ok()?, clip)));
+    let more = std::env::var("KINORA_BENCH_FILES").unwrap_or_default();
+    let more = more.split(':').filter_map(|file| {
+        let name = Path::new(file).file_stem()?.to_str()?.to_owned();
+        Some((name, import::from_path(Path::new(file)).ok()?, 0))
+    });
+    own.chain(shared).chain(more).collect()
 }
 
 /// Rows of a picture of the world, from the front and a little above.
@@ -84,8 +92,10 @@ fn frames(c: &mut Criterion) {
             let clip = [ActiveClip { clip: ClipId(clip), time_s: (f64::from(frame) / 30.0) % duration }];
             frames.advance(&[&clip]).expect("a frame").0
         };
+        let began = Instant::now();
         let world = advance();
-        eprintln!("{name}: {} triangles, {} groups", world.triangle_count(), world.group_count());
+        let (triangles, groups) = (world.triangle_count(), world.group_count());
+        eprintln!("{name}: {triangles} triangles, {groups} groups, first frame in {:?}", began.elapsed());
         group.bench_function("advance", |b| b.iter(&mut advance));
         group.bench_function("rays", |b| b.iter(|| pool.install(|| trace(&world))));
         group.finish();

@@ -93,15 +93,12 @@ impl Stage {
                 Member { id, actor: actor as usize, scene: &self.actors[actor as usize].scene, part }
             };
             let key = self.key(plan, &firsts, &instances);
-            let group = match old.remove(&key) {
-                Some(mut group) => {
-                    group.shape.renumber(&plan.members);
-                    group
-                }
-                None => {
-                    self.next_epoch += 1;
-                    Group::new(lay_out(plan, self.next_epoch, member)?, key, plan.actor)
-                }
+            let group = if let Some(mut group) = old.remove(&key) {
+                group.shape.renumber(&plan.members);
+                group
+            } else {
+                self.next_epoch += 1;
+                Group::new(lay_out(plan, self.next_epoch, member)?, key, plan.actor)
             };
             group.shape.note_places(number, member, &mut places);
             self.groups.push(group);

@@ -103,8 +103,7 @@ mod tests {
             let ray = Ray::new(Vec3::from(origin), Vec3::from(dir));
             prop_assume!(ray.dir != Vec3::ZERO);
             let point = ray.origin.as_dvec3() + ray.dir.as_dvec3() * f64::from(t);
-            let round = |v: f64| v as f32;
-            let near = Vec3::new(round(point.x), round(point.y), round(point.z));
+            let near = point.as_vec3();
             let around = Aabb {
                 min: Vec3::new(near.x.next_down(), near.y.next_down(), near.z.next_down()),
                 max: Vec3::new(near.x.next_up(), near.y.next_up(), near.z.next_up()) + Vec3::from(grow),

@@ -164,3 +164,87 @@ impl Sorted {
         Self { met, count }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use glam::Vec3;
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::{
+        geom::{Aabb, Ray, Triangles},
+        world::GroupLayout,
+    };
+
+    /// Groups without triangles in the given boxes, told apart by their epochs.
+    fn groups(boxes: &[Aabb]) -> Vec<GroupFrame> {
+        let none = Triangles { positions: &[], indices: &[], topology_epoch: 0 };
+        let accel = Arc::new("list".parse::<crate::accel::AccelSpec>().unwrap().build(&none).unwrap());
+        let group = |(topology_epoch, &bounds): (u64, &Aabb)| GroupFrame {
+            layout: Arc::new(GroupLayout { topology_epoch, ..GroupLayout::default() }),
+            positions: Arc::default(),
+            accel: accel.clone(),
+            bounds,
+        };
+        (0..).zip(boxes).map(group).collect()
+    }
+
+    fn visited(kind: TopKind, boxes: &[Aabb], ray: &Ray, t_far: f64) -> Vec<u64> {
+        let groups = groups(boxes);
+        let mut top = Top::default();
+        top.rebuild(kind, &groups);
+        let mut walk = top.walk(&groups, &TravRay::new(ray).unwrap());
+        std::iter::from_fn(|| walk.next(t_far)).map(|group| group.layout.topology_epoch).collect()
+    }
+
+    #[test]
+    fn empty_or_no_boxes_are_not_visited() {
+        for kind in TopKind::ALL {
+            for boxes in [vec![], vec![Aabb::EMPTY; 3], vec![Aabb::EMPTY; 20]] {
+                assert!(visited(kind, &boxes, &Ray::new(Vec3::ZERO, Vec3::X), f64::INFINITY).is_empty());
+            }
+        }
+    }
+
+    #[test]
+    fn a_bound_that_shrinks_ends_the_walk() {
+        for count in [4_u8, 30] {
+            let unit = |i: u8| Aabb { min: Vec3::X * f32::from(i), max: Vec3::X * f32::from(i) + 0.5 };
+            let boxes: Vec<_> = (0..count).map(unit).collect();
+            let groups = groups(&boxes);
+            let mut top = Top::default();
+            top.rebuild(TopKind::Bvh2, &groups);
+            let mut walk = top.walk(&groups, &TravRay::new(&Ray::new(Vec3::new(-1.0, 0.2, 0.2), Vec3::X)).unwrap());
+            let epochs = [f64::INFINITY, f64::INFINITY, 2.9].map(|t| walk.next(t).map(|g| g.layout.topology_epoch));
+            assert_eq!(epochs, [Some(0), Some(1), None], "the third begins at 3");
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn the_walk_visits_exactly_the_boxes_that_the_ray_meets(
+            boxes in prop::collection::vec((prop::array::uniform3(-8_i8..8), prop::array::uniform3(0_u8..4)), 1..60),
+            origin in prop::array::uniform3(-10_i8..10),
+            dir in prop::array::uniform3(-2_i8..3),
+            t_far in 0_u8..20,
+        ) {
+            let boxes: Vec<_> = boxes.into_iter().map(|(min, size)| {
+                let min = Vec3::from(min.map(f32::from));
+                Aabb { min, max: min + Vec3::from(size.map(f32::from)) }
+            }).collect();
+            let ray = Ray::new(Vec3::from(origin.map(f32::from)), Vec3::from(dir.map(f32::from)));
+            prop_assume!(ray.dir != Vec3::ZERO);
+            let slabs = SlabRay::new(&TravRay::new(&ray).unwrap());
+            let t_far = f64::from(t_far);
+            let expected: Vec<u64> =
+                (0..).zip(&boxes).filter(|(_, b)| slabs.entry(b, t_far).is_some()).map(|(i, _)| i).collect();
+            for kind in TopKind::ALL {
+                let mut epochs = visited(kind, &boxes, &ray, t_far);
+                epochs.sort_unstable();
+                prop_assert_eq!(&epochs, &expected, "{:?}", kind);
+            }
+        }
+    }
+}
