@@ -15,7 +15,7 @@ fn main() -> ExitCode {
     let result = match arguments[..] {
         [] => write_all(Path::new("animations")),
         ["--output", folder] => write_all(Path::new(folder)),
-        ["--large", folder] => write(Path::new(folder), "walk-large", &scenes::figure::walk(3.1)),
+        ["--large", folder] => write(Path::new(folder), "walk-large", &scenes::figure::walk(2.9)),
         _ => {
             eprintln!("usage: make_scenes [--output DIR | --large DIR]");
             return ExitCode::from(2);

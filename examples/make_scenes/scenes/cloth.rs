@@ -269,7 +269,7 @@ fn frame(glb: &mut Glb) -> usize {
 /// The bar in the cloth's lower edge turns with the last joint.
 fn lower_bar(glb: &mut Glb, joint: usize) {
     let dark = wood(glb, "bar", "0.16,0.08,0.04");
-    let mesh = bar(0.5 * WIDTH + 0.02, 0.014).write(glb, "lower bar", dark);
+    let mesh = bar(0.5 * WIDTH, 0.014).write(glb, "lower bar", dark);
     let node = glb.node(Node { name: "lower bar".into(), mesh: Some(mesh), ..Node::default() });
     glb.adopt(joint, node);
 }

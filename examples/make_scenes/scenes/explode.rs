@@ -41,7 +41,7 @@ pub fn explode() -> Vec<u8> {
     let node = glb.node(Node { name: "flake".into(), mesh: Some(mesh), skin, ..Node::default() });
     let core = core(&mut glb);
     let floor = floor(&mut glb);
-    let camera = glb.camera("front", DVec3::new(0.0, 1.00, 5.2), DVec3::new(0.0, -0.06, 0.0), deg(33.0));
+    let camera = glb.camera("front", DVec3::new(0.0, 1.00, 5.3), DVec3::new(0.0, -0.02, 0.0), deg(34.0));
     glb.animation("burst", &animation);
     glb.finish(&[root, node, core, floor, camera])
 }
@@ -298,7 +298,7 @@ fn flights(glb: &mut Glb, animation: &mut Animation) -> Vec<[usize; 2]> {
     (0..FLIGHTS)
         .map(|flight| {
             let random = |salt: u64| hash(9000 + 17 * flight as u64 + salt);
-            let (reach, delay) = (mix(0.30, 0.95, random(1) * random(1)), 0.05 * random(2));
+            let (reach, delay) = (mix(0.28, 0.88, random(1) * random(1)), 0.05 * random(2));
             let axis = DVec3::new(random(3) - 0.5, random(4) - 0.5, random(5) - 0.5).normalize_or(DVec3::X);
             let angle = deg(mix(120.0, 420.0, random(6)));
             let amount = |k: usize| spread((k % KEYS) as f64 / KEYS as f64, delay);

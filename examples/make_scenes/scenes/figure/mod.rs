@@ -35,7 +35,7 @@ pub fn walk(detail: f64) -> Vec<u8> {
     let binds = glb.translation_matrices(&binds);
     let skin = Some(glb.skin("figure", &joints, binds));
     let figure = glb.node(Node { name: "figure".into(), mesh: Some(mesh), skin, ..Node::default() });
-    let camera = glb.camera("three-quarter", DVec3::new(1.75, 1.30, 2.85), DVec3::new(0.0, 0.80, 0.0), deg(31.0));
+    let camera = glb.camera("three-quarter", DVec3::new(1.70, 1.32, 2.90), DVec3::new(0.0, 0.77, 0.0), deg(32.5));
     let mut roots = vec![joints[0], figure, camera];
     roots.extend(stage::add(&mut glb, &mut animation, CYCLES as f64 * gait::CYCLE));
     glb.animation("walk", &animation);

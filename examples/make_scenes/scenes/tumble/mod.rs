@@ -68,7 +68,7 @@ pub fn tumble() -> Vec<u8> {
         let sampler = animation.sampler(Keys::Linear, input, output);
         animation.channel(sampler, node, "rotation");
     }
-    roots.push(glb.camera("above", DVec3::new(1.3, 2.35, 4.9), DVec3::new(0.0, 0.22, 0.0), deg(34.0)));
+    roots.push(glb.camera("above", DVec3::new(1.2, 2.25, 4.45), DVec3::new(0.0, 0.36, 0.0), deg(34.0)));
     glb.animation("fountain", &animation);
     glb.finish(&roots)
 }
