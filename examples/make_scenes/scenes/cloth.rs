@@ -167,18 +167,16 @@ const GOLD: DVec3 = DVec3::new(0.86, 0.60, 0.20);
 
 /// A woven rug: a border of triangles round a field of stepped diamonds.
 fn pattern() -> Picture {
-    let (width, height) = (480, 600);
-    Picture::from_fn(width, height, |x, y| {
+    let (columns, rows) = (80i64, 100i64);
+    let knot = |texel: usize| i64::try_from(texel / 6).unwrap_or(0);
+    Picture::from_fn(480, 600, |x, y| {
         // Six texels make one knot; everything is drawn in whole knots.
-        let (columns, rows) = (width as i64 / 6, height as i64 / 6);
-        let (i, j) = (x as i64 / 6, y as i64 / 6);
+        let (i, j) = (knot(x), knot(y));
         let edge = i.min(j).min(columns - 1 - i).min(rows - 1 - j);
         let color = match edge {
-            0 | 1 => BLUE,
-            2 => GOLD,
+            0 | 1 | 10 => BLUE,
+            2 | 9 => GOLD,
             3..=8 => border(if i.min(columns - 1 - i) == edge { j } else { i }, edge - 3),
-            9 => GOLD,
-            10 => BLUE,
             _ => field(2 * i - columns + 1, 2 * j - rows + 1),
         };
         let thread = if (x + y) % 2 == 0 { 1.0 } else { 0.955 };
@@ -200,11 +198,9 @@ fn field(i: i64, j: i64) -> DVec3 {
     let ring = a.abs() * 10 + b.abs() * 7;
     match ring {
         0..45 => GOLD,
-        45..90 => RED,
-        90..125 => CREAM,
+        45..90 | 235..262 => RED,
+        90..125 | 205..235 => CREAM,
         125..205 => BLUE,
-        205..235 => CREAM,
-        235..262 => RED,
         _ if (i.rem_euclid(8) < 4) == (j.rem_euclid(8) < 4) => RED * 0.82,
         _ => RED,
     }

@@ -187,7 +187,7 @@ impl Glb {
         self.floats(&values, false)
     }
 
-    /// Unit vectors in three signed bytes each (KHR_mesh_quantization).
+    /// Unit vectors in three signed bytes each (`KHR_mesh_quantization`).
     pub fn normals_i8(&mut self, values: &[DVec3]) -> Accessor {
         self.quantized = true;
         let byte = |c: f64| ((c * 127.0).round() as i8).cast_unsigned();
@@ -196,7 +196,7 @@ impl Glb {
         self.accessor(&bytes, values.len(), &layout, "")
     }
 
-    /// Whole numbers in three signed shorts each (KHR_mesh_quantization), to be scaled by a node.
+    /// Whole numbers in three signed shorts each (`KHR_mesh_quantization`), to be scaled by a node.
     pub fn positions_i16(&mut self, values: &[[i16; 3]]) -> Accessor {
         self.quantized = true;
         let bytes: Vec<u8> = values.iter().flat_map(|v| [v[0], v[1], v[2], 0]).flat_map(i16::to_le_bytes).collect();

@@ -42,7 +42,7 @@ impl Picture {
             let row: Vec<u8> = row.iter().flatten().copied().collect();
             let best = (0..5u8)
                 .map(|kind| filtered(kind, &row, &above))
-                .min_by_key(|r| r.iter().skip(1).map(|&b| u64::from((b as i8).unsigned_abs())).sum::<u64>());
+                .min_by_key(|r| r.iter().skip(1).map(|&b| u64::from(b.cast_signed().unsigned_abs())).sum::<u64>());
             out.extend(best.into_iter().flatten());
             above = row;
         }
@@ -181,13 +181,13 @@ fn zlib(data: &[u8]) -> Vec<u8> {
             bits.symbol(u32::from(data[at]));
             1
         };
-        for place in at..at + step {
-            if let Some(slot) = hash3(data, place) {
-                previous[place] = head[slot];
-                head[slot] = place;
+        for _ in 0..step {
+            if let Some(slot) = hash3(data, at) {
+                previous[at] = head[slot];
+                head[slot] = at;
             }
+            at += 1;
         }
-        at += step;
     }
     bits.symbol(256);
     bits.put(0, 7);

@@ -119,7 +119,7 @@ fn trunk(at: &mut Stance, phase: f64) {
     let (turn, tip, beat) = (cos_turns(phase), cos_turns(phase - 0.29), cos_turns(2.0 * (phase - 0.06)));
     let set = |lean: f64, yaw: f64, roll: f64| euler(deg(lean), deg(yaw), deg(roll));
     at.world[Joint::Hips as usize] = set(3.0, -7.0 * turn, 3.2 * tip);
-    at.world[Joint::Spine as usize] = set(3.5 + 0.6 * beat, -1.0 * turn, 0.4 * tip);
+    at.world[Joint::Spine as usize] = set(3.5 + 0.6 * beat, -turn, 0.4 * tip);
     at.world[Joint::Chest as usize] = set(2.5 + 0.8 * beat, 7.0 * turn, -1.8 * tip);
     at.world[Joint::Neck as usize] = set(3.0 - 0.5 * beat, 3.0 * turn, -0.8 * tip);
     at.world[Joint::Head as usize] = set(-1.0 - 1.0 * beat, 1.2 * turn, -0.5 * tip);

@@ -47,7 +47,7 @@ fn sculpt(body: &Body, detail: f64) -> Surface {
     let field = |p: DVec3| body.distance(p);
     let base = 0.0210 / detail;
     let x = |x: f64| if x.abs() > 0.40 { 0.72 * base } else { base };
-    let y = |y: f64| if y > 1.36 || y < 0.12 { 0.85 * base } else { 1.12 * base };
+    let y = |y: f64| if (0.12..=1.36).contains(&y) { 1.12 * base } else { 0.85 * base };
     let axes = [
         nets::grid_lines(-0.62, 0.62, x),
         nets::grid_lines(-0.03, 1.70, y),
