@@ -92,7 +92,7 @@ pub fn deform_range_at(
     out: &mut [Vec3],
 ) {
     let part = scene.part(instance);
-    assert!(part.positions.len() - first >= out.len(), "range within the part");
+    assert!(first <= part.positions.len() && out.len() <= part.positions.len() - first, "range within the part");
     let weights = pose.weights(instance.node);
     dispatch(level, Deform { part, weights, placement: placement(scene, pose, instance), first, out });
 }
