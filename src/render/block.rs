@@ -206,10 +206,19 @@ fn shade(ctx: &FrameContext<'_>, ray: &Ray, hit: &Hit) -> Point {
     }
 }
 
-/// The next thing that a camera ray sees. The range is closed and layers up to the last are refused, so none is lost
-/// and none is met twice.
+/// The next thing that a camera ray sees.
+///
+/// Nearly always that is simply the nearest hit, which is found without asking anybody on the way; only where that
+/// one does not count (a culled face, a hole, a layer already met) the ray goes again with the filter. Its range is
+/// closed and layers up to the last are refused, so none is lost and none is met twice.
 #[inline(always)]
 fn closest<S: Simd>(ctx: &FrameContext<'_>, lane: &Lane) -> Option<Hit> {
+    if lane.last.is_none() {
+        let nearest = ctx.world.nearest_hit::<S>(&lane.ray)?;
+        if is_seen(ctx, &lane.ray, None, &nearest) {
+            return Some(nearest);
+        }
+    }
     let after = lane.last.map(|hit| layer_key(&hit));
     let rest = Ray { t_near: lane.last.map_or(lane.ray.t_near, |hit| hit.t), ..lane.ray };
     ctx.world.closest_hit::<S, _>(&rest, &|hit: &Hit| is_seen(ctx, &lane.ray, after, hit))
@@ -221,6 +230,9 @@ fn closest<S: Simd>(ctx: &FrameContext<'_>, lane: &Lane) -> Option<Hit> {
 /// structure finds them.
 #[inline(always)]
 fn transmittance<S: Simd>(ctx: &FrameContext<'_>, probe: &Probe) -> f32 {
+    if !ctx.pierced {
+        return if ctx.world.is_blocked::<S>(&probe.ray) { 0.0 } else { 1.0 };
+    }
     let layers = Cell::new(Layers::default());
     if ctx.world.is_occluded::<S, _>(&probe.ray, &|hit: &Hit| ctx.stops(probe.width, hit, &layers)) {
         return 0.0;

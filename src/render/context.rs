@@ -41,7 +41,8 @@ pub(crate) struct FrameContext<'a> {
     pub(crate) emission: f32,
     pub(crate) rays: RayMaker,
     pub(crate) settings: RenderSettings,
-    pub(crate) blends: bool,
+    /// Some material lets rays through, in holes or in part.
+    pub(crate) pierced: bool,
     /// Reach of ambient occlusion in metres.
     pub(crate) reach: f32,
     /// Depth that is shown white and depth that is shown black.

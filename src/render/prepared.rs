@@ -19,8 +19,8 @@ pub(crate) struct PreparedScene {
     pub(crate) light_nodes: Vec<NodeId>,
     /// Scale that brings the file's lights to a mean level; 1 without lights.
     pub(crate) exposure: f32,
-    /// Some material blends.
-    pub(crate) blends: bool,
+    /// Some material is masked or blended.
+    pub(crate) pierced: bool,
 }
 
 impl PreparedScene {
@@ -33,8 +33,8 @@ impl PreparedScene {
         let has_light = |n: &NodeId| scene.nodes[n.index()].light.is_some();
         let light_nodes: Vec<_> = scene.draw_order.iter().copied().filter(has_light).collect();
         let exposure = exposure::of_scene(&scene, &light_nodes);
-        let blends = materials.iter().any(|m| m.coverage == Coverage::Blend);
-        Self { scene, materials, pyramids, light_nodes, exposure, blends }
+        let pierced = materials.iter().any(|m| m.coverage != Coverage::Opaque);
+        Self { scene, materials, pyramids, light_nodes, exposure, pierced }
     }
 
     /// Number of the material of a part, that of glTF's default material when it names none.

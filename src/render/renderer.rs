@@ -206,7 +206,7 @@ impl Renderer {
             emission: if own { self.exposure().clamp(0.25, 4.0) } else { 1.0 },
             rays,
             settings: RenderSettings { samples: settings.samples.max(1), ..*settings },
-            blends: self.prepared.iter().any(|p| p.blends),
+            pierced: self.prepared.iter().any(|p| p.pierced),
             reach: reach(bounds),
             depth_range: rays.depth_range(bounds),
             size,

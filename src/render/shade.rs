@@ -66,7 +66,7 @@ impl ShadePoint {
         let info = ctx.info(hit.instance);
         let material = ctx.material(info);
         let mut patch = Patch::new(ctx, info, hit);
-        if !material.is_plain() || ctx.blends {
+        if !material.is_plain() || ctx.pierced {
             patch = patch.with_steps(ctx, ray, hit.t);
         }
         let surface = Surface::new(ctx, info, &patch, ray, hit);
@@ -90,7 +90,7 @@ impl ShadePoint {
         } else {
             finish.emitted * ctx.emission + surroundings(ctx, &surface, &finish, &view)
         };
-        let width = if ctx.blends { patch.width() } else { 0.0 };
+        let width = if ctx.pierced { patch.width() } else { 0.0 };
         Self { surface, reflectance: finish.reflectance, view, color, alpha, width, lit: !material.unlit }
     }
 

@@ -168,7 +168,7 @@ impl Surface {
         let away = if dir.dot(self.n_geom) < 0.0 { -self.n_geom } else { self.n_geom };
         let offset = away * away.abs().dot(self.error);
         let start = self.point + offset;
-        Vec3::new(past(start.x, offset.x), past(start.y, offset.y), past(start.z, offset.z))
+        Vec3::new(past(start.x, away.x), past(start.y, away.y), past(start.z, away.z))
     }
 
     /// [`Surface::origin`] for shadow rays: lifted to the smooth surface, so that facets do not shadow themselves.
@@ -178,12 +178,12 @@ impl Surface {
     }
 }
 
-/// The next float in the direction of `offset`.
+/// The next float in the direction of `away`: a point with error zero, as on a coordinate plane, must leave it too.
 #[inline(always)]
-fn past(x: f32, offset: f32) -> f32 {
-    if offset > 0.0 {
+fn past(x: f32, away: f32) -> f32 {
+    if away > 0.0 {
         x.next_up()
-    } else if offset < 0.0 {
+    } else if away < 0.0 {
         x.next_down()
     } else {
         x
