@@ -9,7 +9,7 @@ use glam::Vec3;
 
 use super::{
     context::FrameContext,
-    filter::{Layers, is_seen, layer_key},
+    filter::{Layer, Layers, is_seen},
     pattern::{PixelSampler, subpixel},
     plain::PlainPoint,
     shade::ShadePoint,
@@ -219,9 +219,9 @@ fn closest<S: Simd>(ctx: &FrameContext<'_>, lane: &Lane) -> Option<Hit> {
             return Some(nearest);
         }
     }
-    let after = lane.last.map(|hit| layer_key(&hit));
+    let after = lane.last.as_ref().map(Layer::new);
     let rest = Ray { t_near: lane.last.map_or(lane.ray.t_near, |hit| hit.t), ..lane.ray };
-    ctx.world.closest_hit::<S, _>(&rest, &|hit: &Hit| is_seen(ctx, &lane.ray, after, hit))
+    ctx.world.closest_hit::<S, _>(&rest, &|hit: &Hit| is_seen(ctx, &lane.ray, after.as_ref(), hit))
 }
 
 /// The part of a probe's light that arrives.

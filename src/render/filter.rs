@@ -9,20 +9,39 @@ use super::{
 };
 use crate::geom::{Hit, Ray};
 
-/// Place of a hit in the order of blending.
-pub(crate) type LayerKey = (f32, u32, u32);
+/// Place of a hit in the order of blending: least `t`, then instance, then triangle.
+type LayerKey = (f32, u32, u32);
 
-/// The key of a hit: least `t`, then instance, then triangle.
-#[inline(always)]
-pub(crate) fn layer_key(hit: &Hit) -> LayerKey {
-    (hit.t, hit.instance.0, hit.prim.0)
+/// A layer of blending that a ray has met.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Layer {
+    key: LayerKey,
+    on_edge: bool,
+}
+
+impl Layer {
+    #[inline(always)]
+    pub(crate) fn new(hit: &Hit) -> Self {
+        const EDGE: f32 = 1e-6;
+        let on_edge = hit.u.min(hit.v).min(1.0 - hit.u - hit.v) <= EDGE;
+        Self { key: (hit.t, hit.instance.0, hit.prim.0), on_edge }
+    }
+
+    /// True when both are one surface: two triangles of a part that share the edge or corner where the ray meets them.
+    #[inline(always)]
+    fn joins(&self, other: &Self) -> bool {
+        self.on_edge && other.on_edge && self.key.0 == other.key.0 && self.key.1 == other.key.1
+    }
 }
 
 /// True when a camera ray sees `hit`: not a culled back face, not in a hole, behind the layer `after`.
 #[inline(always)]
-pub(crate) fn is_seen(ctx: &FrameContext<'_>, ray: &Ray, after: Option<LayerKey>, hit: &Hit) -> bool {
-    if after.is_some_and(|last| layer_key(hit) <= last) {
-        return false;
+pub(crate) fn is_seen(ctx: &FrameContext<'_>, ray: &Ray, after: Option<&Layer>, hit: &Hit) -> bool {
+    if let Some(last) = after {
+        let layer = Layer::new(hit);
+        if layer.key <= last.key || layer.joins(last) {
+            return false;
+        }
     }
     let info = ctx.info(hit.instance);
     let material = ctx.material(info);
@@ -69,19 +88,25 @@ const KEPT: usize = 16;
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Layers {
     count: usize,
-    kept: [(LayerKey, f32); KEPT],
+    kept: [(Layer, f32); KEPT],
 }
 
 impl Layers {
     /// Keeps a layer, once; the farthest falls off when there are too many.
-    fn add(&mut self, key: LayerKey, alpha: f32) {
-        let at = self.kept[..self.count].iter().take_while(|(k, _)| *k < key).count();
-        if at == KEPT || (at < self.count && self.kept[at].0 == key) {
+    fn add(&mut self, layer: Layer, alpha: f32) {
+        let kept = &mut self.kept[..self.count];
+        if let Some(same) = kept.iter_mut().find(|(k, _)| k.key == layer.key || k.joins(&layer)) {
+            if layer.key < same.0.key {
+                *same = (layer, alpha);
+            }
             return;
         }
-        self.count = (self.count + 1).min(KEPT);
-        self.kept[at..self.count].rotate_right(1);
-        self.kept[at] = (key, alpha);
+        let at = kept.iter().take_while(|(k, _)| k.key < layer.key).count();
+        if at < KEPT {
+            self.count = (self.count + 1).min(KEPT);
+            self.kept[at..self.count].rotate_right(1);
+            self.kept[at] = (layer, alpha);
+        }
     }
 
     /// The part of the light that all layers together let through.
@@ -108,7 +133,7 @@ impl FrameContext<'_> {
             Coverage::Blend => {
                 if alpha > 0.0 && alpha < 1.0 {
                     let mut all = layers.get();
-                    all.add(layer_key(hit), alpha);
+                    all.add(Layer::new(hit), alpha);
                     layers.set(all);
                 }
                 alpha >= 1.0
@@ -121,10 +146,14 @@ impl FrameContext<'_> {
 mod tests {
     use super::*;
 
+    fn layer(t: f32, instance: u32, prim: u32) -> Layer {
+        Layer { key: (t, instance, prim), on_edge: false }
+    }
+
     #[test]
     fn layers_multiply_in_order_whatever_the_order_they_come_in() {
-        let all: Vec<(LayerKey, f32)> =
-            (0..12u32).map(|i| ((1.0 + (i / 3) as f32, i % 3, i), 0.1 + 0.03 * i as f32)).collect();
+        let all: Vec<(Layer, f32)> =
+            (0..12u32).map(|i| (layer(1.0 + (i / 3) as f32, i % 3, i), 0.1 + 0.03 * i as f32)).collect();
         let product = all.iter().fold(1.0f32, |p, (_, a)| p * (1.0 - a));
         for turn in 0..12 {
             let mut layers = Layers::default();
@@ -141,10 +170,21 @@ mod tests {
     fn the_nearest_layers_are_kept_when_there_are_many() {
         let (mut up, mut down) = (Layers::default(), Layers::default());
         for i in 0..40u32 {
-            up.add((i as f32, 0, 0), 0.5);
-            down.add(((39 - i) as f32, 0, 0), 0.5);
+            up.add(layer(i as f32, 0, 0), 0.5);
+            down.add(layer((39 - i) as f32, 0, 0), 0.5);
         }
-        assert_eq!(up.kept.map(|k| k.0.0), std::array::from_fn(|i| i as f32));
-        assert_eq!(down.kept.map(|k| k.0.0), up.kept.map(|k| k.0.0));
+        assert_eq!(up.kept.map(|k| k.0.key.0), std::array::from_fn(|i| i as f32));
+        assert_eq!(down.kept.map(|k| k.0.key.0), up.kept.map(|k| k.0.key.0));
+    }
+
+    #[test]
+    fn triangles_that_meet_at_an_edge_are_one_layer() {
+        let edge = |instance, prim| Layer { key: (2.0, instance, prim), on_edge: true };
+        let mut layers = Layers::default();
+        for (instance, prim) in [(0, 4), (0, 3), (1, 4), (0, 4)] {
+            layers.add(edge(instance, prim), 0.5);
+        }
+        layers.add(layer(2.0, 0, 5), 0.5);
+        assert_eq!(layers.transmittance(), 0.125);
     }
 }
