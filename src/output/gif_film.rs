@@ -10,9 +10,14 @@ use super::{
     stamp::KEYWORD,
 };
 
-/// Palette search: 1 is slowest, 30 fastest. On rendered pictures 30 loses nothing to the slower ones:
-/// `benches/records/2026-11-22-png.md`.
-const SPEED: i32 = 30;
+/// Palette search looks at every n-th pixel, n = 1 to 30, at this many or more. On rendered pictures of 720p,
+/// n = 30 loses nothing to smaller ones (`benches/records/2026-11-22-png.md`); small pictures need all their pixels.
+const LOOKED_AT: usize = 16_384;
+
+/// The n for a number of pixels.
+fn sampling(pixels: usize) -> i32 {
+    i32::try_from(pixels / LOOKED_AT).map_or(30, |n| n.clamp(1, 30))
+}
 
 /// Everything before the first frame.
 ///
@@ -32,7 +37,7 @@ pub(super) fn header(film: &FilmSettings) -> Result<Vec<u8>, String> {
 pub(super) fn frame(film: &FilmSettings, slot: &mut FrameSlot) -> Result<(), String> {
     let (width, height) = size(film)?;
     slot.film.to_srgb8(&mut slot.rgba);
-    let mut frame = Frame::from_rgba_speed(width, height, &mut slot.rgba, SPEED);
+    let mut frame = Frame::from_rgba_speed(width, height, &mut slot.rgba, sampling(slot.film.color.len()));
     frame.delay = delay(film.fps, slot.ordinal);
     frame.make_lzw_pre_encoded();
     let mut buffer = std::mem::take(&mut slot.bytes);

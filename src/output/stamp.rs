@@ -67,6 +67,11 @@ impl Stamp {
         Self(format!("settings={};frames={count}", settings.0))
     }
 
+    /// The first 16 digits of the settings' hash, where there is room for no more.
+    pub fn short(&self) -> &str {
+        self.0.strip_prefix("settings=").and_then(|hash| hash.get(..16)).unwrap_or_default()
+    }
+
     /// The text in the file.
     pub fn as_str(&self) -> &str {
         &self.0
