@@ -11,11 +11,11 @@ use super::{Halves, Lanes, Simd, SimdLevel};
 
 /// AVX2 with FMA.
 #[derive(Clone, Copy, Debug)]
-pub struct Avx2;
+pub(super) struct Avx2;
 
 /// AVX-512 besides.
 #[derive(Clone, Copy, Debug)]
-pub struct Avx512;
+pub(super) struct Avx512;
 
 impl Simd for Avx2 {
     const LEVEL: SimdLevel = SimdLevel::Avx2;
@@ -72,7 +72,7 @@ macro_rules! vector {
      $set1:ident $load:ident $store:ident $add:ident $sub:ident $mul:ident $div:ident $min:ident $max:ident
      $fmadd:ident $fmsub:ident $xor:ident $andnot:ident) => {
         #[derive(Clone, Copy, Debug)]
-        pub struct $name($raw);
+        pub(super) struct $name($raw);
 
         impl Add for $name {
             type Output = Self;
@@ -184,7 +184,7 @@ vector!(F64x8(__m512d), f64 x 8, compare register _mm512_cmp_pd_mask,
 
 /// Lane numbers for `vpermilps`.
 #[derive(Clone, Copy, Debug)]
-pub struct Order(__m128i);
+pub(super) struct Order(__m128i);
 
 impl Halves for F32x4 {
     type Swap = Order;
