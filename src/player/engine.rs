@@ -243,3 +243,85 @@ impl Engine for TraceEngine {
         self.spent.push(rgba);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{dynamics::RebuildPolicy, player::request::StillFile, render::Shading, scene::builtin};
+
+    fn engine() -> TraceEngine {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().unwrap();
+        let config = FrameConfig {
+            accel: "list".to_owned(),
+            top: "list".to_owned(),
+            policy: RebuildPolicy::default(),
+            pool: Arc::new(pool),
+        };
+        TraceEngine::new(config, SimdLevel::best(), 1, Unfinished::default())
+    }
+
+    fn shot(width: u32, height: u32) -> Shot {
+        Shot {
+            scene: Arc::new(builtin::load(builtin::names()[0]).unwrap()),
+            clips: [ClipId(0)].into(),
+            time_s: 0.3,
+            view: ViewSpec::Framed,
+            shading: Shading::Direct,
+            structure: "bvh2".into(),
+            width,
+            height,
+        }
+    }
+
+    #[test]
+    fn refinement_ends_with_the_picture_of_all_samples_in_one_go() {
+        let shot = shot(10, 8);
+        let (mut engine, mut other) = (engine(), engine());
+        let mut at_once = |samples| {
+            let pass = other.trace(&shot, 1, 0, samples).unwrap();
+            other.picture(&shot, pass, 1, samples).rgba
+        };
+        let one = at_once(1);
+        let mut picture = engine.refine(&shot, true).unwrap();
+        assert_eq!((picture.samples, &picture.rgba), (1, &one), "the first is that of one sample");
+        let folder = tempfile::tempdir().unwrap();
+        while !picture.is_final {
+            if picture.samples == 31 {
+                let still = StillJob { shot: shot.clone(), file: StillFile::Exact(folder.path().join("a.png")) };
+                engine.still(&still).unwrap();
+            }
+            picture = engine.refine(&shot, false).unwrap();
+        }
+        assert_eq!(picture.samples, REFINED_SAMPLES);
+        let expected = at_once(REFINED_SAMPLES);
+        let worst = picture.rgba.iter().zip(&expected).map(|(a, b)| a.abs_diff(*b)).max();
+        assert!(worst <= Some(1), "{worst:?}");
+        assert_ne!(picture.rgba, one);
+    }
+
+    #[test]
+    fn draft_has_the_size_of_its_divisor_and_reuses_memory() {
+        let shot = shot(17, 9);
+        let mut engine = engine();
+        let picture = engine.draft(&shot, 2).unwrap();
+        assert_eq!((picture.width, picture.height, picture.rgba.len()), (9, 5, 4 * 9 * 5));
+        let memory = picture.rgba.as_ptr();
+        engine.recycle(picture.rgba);
+        assert_eq!(engine.draft(&shot, 2).unwrap().rgba.as_ptr(), memory);
+    }
+
+    #[test]
+    fn structure_and_scene_may_change_and_pictures_do_not_depend_on_the_past() {
+        let first = shot(8, 5);
+        let mut engine = engine();
+        let bvh2 = engine.draft(&first, 1).unwrap().rgba;
+        let list = engine.draft(&Shot { structure: "list".into(), ..first.clone() }, 1).unwrap().rgba;
+        assert_eq!(bvh2, list);
+        let rest = engine.draft(&Shot { clips: [].into(), ..first.clone() }, 1).unwrap().rgba;
+        assert_ne!(bvh2, rest);
+        assert_eq!(engine.draft(&shot(8, 5), 1).unwrap().rgba, bvh2, "the same scene loaded again");
+        let wrong = engine.draft(&Shot { structure: "no such".into(), ..first.clone() }, 1);
+        assert!(wrong.is_err_and(|reason| reason.contains("no such")));
+        assert_eq!(engine.draft(&first, 1).unwrap().rgba, bvh2);
+    }
+}
