@@ -30,7 +30,7 @@ const MAX_SIDE: u32 = 16_384;
 
 /// Arguments of `play`.
 #[derive(Debug, Args)]
-#[command(after_help = "Press H in the window for its keys.")]
+#[command(after_help = controls())]
 pub(crate) struct PlayArgs {
     #[arg(value_name = "SCENE", help = SCENE_HELP)]
     scene: Option<String>,
@@ -65,6 +65,14 @@ pub(crate) struct PlayArgs {
     /// Samples a pixel of pictures that are written to files
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = values::samples())]
     samples: u32,
+}
+
+/// The controls as part of the help.
+fn controls() -> String {
+    let rows = player::controls();
+    let width = rows.iter().map(|(keys, _)| keys.len()).max().unwrap_or(0);
+    let lines: Vec<_> = rows.iter().map(|(keys, what)| format!("  {keys:width$}  {what}")).collect();
+    format!("In the window:\n{}", lines.join("\n"))
 }
 
 /// Opens the window and plays until it is closed.

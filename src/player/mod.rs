@@ -1,6 +1,6 @@
 //! The window: plays a scene, takes keys and pointer, shows what the render thread makes.
 //!
-//! Only [`window`](self) code names a window type; everything else works without a display. The window thread
+//! Only `window.rs` names a window type; everything else works without a display. The window thread
 //! never waits for a frame: it posts what should be seen, the render thread makes the newest request into a
 //! picture and wakes the window. While a clip runs, pictures have one sample a pixel at a resolution that holds
 //! the frame rate; while it stands, they are refined at full size.
@@ -99,6 +99,11 @@ pub struct PlayOptions {
     pub screenshot: Option<PathBuf>,
     /// Samples a pixel of pictures that are written to files.
     pub still_samples: u32,
+}
+
+/// The controls: what to press, and what it does.
+pub fn controls() -> &'static [(&'static str, &'static str)] {
+    &input::HELP
 }
 
 /// What playing draws on.

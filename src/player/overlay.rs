@@ -11,9 +11,9 @@ const DIM: u32 = 0x00b8_c4cc;
 const RED: u32 = 0x00ff_8a7a;
 const PANEL: u32 = 0x0008_0c10;
 
-/// Size of a font pixel for a window: about 40 lines of text, and room for the help's width.
+/// Size of a font pixel for a window: 30 to 60 lines of text, and room for the help's width.
 pub(super) fn text_scale(width: u32, height: u32) -> i32 {
-    let fits = (height / 400).min(width / 400).clamp(1, 8);
+    let fits = ((height + 180) / 450).min(width / 400).clamp(1, 8);
     i32::try_from(fits).unwrap_or(1)
 }
 
@@ -80,7 +80,7 @@ pub(super) fn status_lines(status: &Status<'_>, picture: &Picture) -> Vec<String
     vec![
         format!("{}   {:.1} fps", status.file, status.fps),
         format!("{}  = {total:.1} ms   {mega_rays:.1} Mrays/s", stages.join("  ")),
-        format!("{} triangles   {}   {} swaps", grouped(triangles(picture)), shot.structure, picture.counts.swaps),
+        format!("{} triangles   {}   swaps {}", grouped(triangles(picture)), shot.structure, picture.counts.swaps),
         format!("{size}{samples}   {}   {}", status.shading, status.camera),
         status.clips.to_owned(),
         format!("{:.3} / {:.3} s   speed {}{pause}", status.time_s, status.duration_s, status.speed),

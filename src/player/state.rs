@@ -283,8 +283,13 @@ impl Player {
         match result {
             Ok(scene) => {
                 let playlist = Playlist::new(&scene, None);
-                let stage = Stage::new(scene, playlist, self.stage.structure);
-                self.say(now_s, format!("opened {}", file.display()), false);
+                let stage = Stage::new(Arc::clone(&scene), playlist, self.stage.structure);
+                let warnings = match scene.warnings.len() {
+                    0 => String::new(),
+                    1 => ", 1 warning".to_owned(),
+                    count => format!(", {count} warnings"),
+                };
+                self.say(now_s, format!("opened {}{warnings}", file.display()), false);
                 self.replace_stage(now_s, stage);
             }
             Err(reason) => self.say(now_s, reason, true),
