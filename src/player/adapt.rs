@@ -27,8 +27,8 @@ pub(super) struct Adapt {
 
 impl Default for Adapt {
     fn default() -> Self {
-        // Half size until the first measurement: responsive at once, and at most one step from most answers.
-        Self { level: 1, fixed_s: 0.0, full_trace_s: 0.0, measured: false, slow: 0, fast: 0 }
+        // Coarse until the first measurement, which then says what fits.
+        Self { level: DIVISORS.len() - 1, fixed_s: 0.0, full_trace_s: 0.0, measured: false, slow: 0, fast: 0 }
     }
 }
 
@@ -52,6 +52,9 @@ impl Adapt {
             self.full_trace_s += BLEND * (full_s - self.full_trace_s);
         } else {
             (self.fixed_s, self.full_trace_s, self.measured) = (fixed_s, full_s, true);
+            let fits = |&level: &usize| self.predicted_s(level) < ROOM * budget_s;
+            self.change((0..DIVISORS.len()).find(fits).unwrap_or(DIVISORS.len() - 1));
+            return;
         }
         let over = fixed_s + trace_s > budget_s && self.predicted_s(self.level) > budget_s;
         self.slow = if over { self.slow + 1 } else { 0 };
@@ -68,9 +71,9 @@ impl Adapt {
         (self.level, self.slow, self.fast) = (level, 0, 0);
     }
 
-    /// Forgets what was measured (another scene, another kind of picture) but keeps the divisor.
+    /// Forgets what was measured: another scene, structure or kind of picture. The next frame is coarse.
     pub(super) fn forget(&mut self) {
-        *self = Self { level: self.level, ..Self::default() };
+        *self = Self::default();
     }
 }
 
@@ -118,6 +121,16 @@ mod tests {
             let divisor = f64::from(seen[299]);
             assert!(divisor > 3.5 || 0.002 + full_s / (divisor * divisor) <= BUDGET, "misses at {full_ms} ms");
         }
+    }
+
+    #[test]
+    fn first_frame_is_coarse_and_its_time_chooses_the_next() {
+        let mut adapt = Adapt::default();
+        assert_eq!(adapt.divisor(), 4);
+        assert_eq!(play(&mut adapt, 1, 0.001, 0.015), [1]);
+        adapt.forget();
+        assert_eq!(adapt.divisor(), 4);
+        assert_eq!(play(&mut adapt, 1, 0.001, 0.080), [2]);
     }
 
     #[test]

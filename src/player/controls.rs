@@ -55,11 +55,11 @@ impl Player {
             Action::NextShading => {
                 let place = Shading::ALL.iter().position(|&s| s == self.shading);
                 self.shading = Shading::ALL[place.map_or(0, |p| (p + 1) % Shading::ALL.len())];
-                self.picture_changes();
+                self.picture_changes(now_s);
             }
             Action::NextStructure => {
                 self.stage.structure = (self.stage.structure + 1) % self.structures.len();
-                self.picture_changes();
+                self.picture_changes(now_s);
             }
             Action::NextCamera => {
                 if let View::Free(orbit) = self.view {

@@ -1,6 +1,10 @@
 //! From a request to a picture: the frame loop and the renderer behind the window.
 
-use std::{path::PathBuf, sync::Arc, time::Instant};
+use std::{
+    path::PathBuf,
+    sync::{Arc, atomic::AtomicBool},
+    time::Instant,
+};
 
 use glam::DAffine3;
 
@@ -24,7 +28,7 @@ use crate::{
 
 /// Samples a pixel at which a picture that stands still is left alone.
 const REFINED_SAMPLES: u32 = 64;
-/// Samples a pixel of one refining pass: few, so that a moved camera is not kept waiting.
+/// Samples a pixel of one refining pass: few, so that more and more of the picture is soon seen.
 const PASS_SAMPLES: u32 = 2;
 
 /// Traces on behalf of the window.
@@ -151,8 +155,15 @@ impl TraceEngine {
         }
     }
 
-    /// Traces samples `first .. first + count` of a shot into the film, at the window's size over `divisor`.
-    fn trace(&mut self, shot: &Shot, divisor: u32, first: u32, count: u32) -> Result<Pass, String> {
+    /// Traces samples `first .. first + count` of a shot into the film, at the window's size over `divisor`; `None`
+    /// when stopped.
+    fn trace(
+        &mut self,
+        shot: &Shot,
+        divisor: u32,
+        (first, count): (u32, u32),
+        stop: &AtomicBool,
+    ) -> Result<Option<Pass>, String> {
         let settings = RenderSettings {
             shading: shot.shading,
             samples: count,
@@ -169,8 +180,9 @@ impl TraceEngine {
         let (width, height) = traced_size(shot.width, shot.height, divisor);
         self.film.resize(width, height);
         let Self { renderer, film, .. } = self;
-        let rays = pool.install(|| renderer.render(&world, &view, &settings, film));
-        Ok(Pass { times: FrameTimes { stages, trace: begun.elapsed() }, rays, view, bounds: world.bounds() })
+        let rays = pool.install(|| renderer.render_until(&world, &view, &settings, film, stop));
+        let times = FrameTimes { stages, trace: begun.elapsed() };
+        Ok(rays.map(|rays| Pass { times, rays, view, bounds: world.bounds() }))
     }
 
     /// The film as a picture.
@@ -212,25 +224,25 @@ impl TraceEngine {
 }
 
 impl Engine for TraceEngine {
-    fn draft(&mut self, shot: &Shot, divisor: u32) -> Result<Picture, String> {
-        let pass = self.trace(shot, divisor, 0, 1)?;
-        Ok(self.picture(shot, pass, divisor, 1))
+    fn draft(&mut self, shot: &Shot, divisor: u32, stop: &AtomicBool) -> Result<Option<Picture>, String> {
+        let pass = self.trace(shot, divisor, (0, 1), stop)?;
+        Ok(pass.map(|pass| self.picture(shot, pass, divisor, 1)))
     }
 
-    fn refine(&mut self, shot: &Shot, restart: bool) -> Result<Picture, String> {
-        // A picture of one sample is soonest there; the others add to it.
-        let count = if restart { 1 } else { PASS_SAMPLES.min(REFINED_SAMPLES - self.summed) };
+    fn refine(&mut self, shot: &Shot, restart: bool, stop: &AtomicBool) -> Result<Option<Picture>, String> {
         if restart {
             self.summed = 0;
         }
-        let pass = self.trace(shot, 1, self.summed, count)?;
+        // A picture of one sample is soonest there; the others add to it.
+        let count = if restart { 1 } else { PASS_SAMPLES.min(REFINED_SAMPLES - self.summed) };
+        let Some(pass) = self.trace(shot, 1, (self.summed, count), stop)? else { return Ok(None) };
         self.accumulate(count);
-        Ok(self.picture(shot, pass, 1, self.summed))
+        Ok(Some(self.picture(shot, pass, 1, self.summed)))
     }
 
     fn still(&mut self, job: &StillJob) -> Result<PathBuf, String> {
         // A refinement goes on afterwards from its sum, which this leaves alone.
-        self.trace(&job.shot, 1, 0, self.still_samples)?;
+        self.trace(&job.shot, 1, (0, self.still_samples), &AtomicBool::new(false))?;
         let mut rgba = self.spent.pop().unwrap_or_default();
         let film = &self.film;
         self.config.pool.install(|| film.to_srgb8(&mut rgba));
@@ -247,7 +259,22 @@ impl Engine for TraceEngine {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{dynamics::RebuildPolicy, player::request::StillFile, render::Shading, scene::builtin};
+    use crate::{dynamics::RebuildPolicy, player::request::StillFile, render::Shading, scene::import};
+
+    /// A triangle that slides to the right within a second.
+    const SCENE: &str = r#"{"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+        "animations": [{"samplers": [{"input": 1, "output": 2}],
+            "channels": [{"sampler": 0, "target": {"node": 0, "path": "translation"}}]}],
+        "accessors": [
+            {"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3", "min": [-1, 0, 0], "max": [1, 2, 0]},
+            {"bufferView": 1, "componentType": 5126, "count": 2, "type": "SCALAR", "min": [0], "max": [1]},
+            {"bufferView": 2, "componentType": 5126, "count": 2, "type": "VEC3"}],
+        "bufferViews": [{"buffer": 0, "byteLength": 36}, {"buffer": 0, "byteOffset": 36, "byteLength": 8},
+            {"buffer": 0, "byteOffset": 44, "byteLength": 24}],
+        "buffers": [{"byteLength": 68, "uri": "data:application/octet-stream;base64,AACAvwAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAAEAAAAAAAAAAAAAAgD8AAAAAAAAAAAAAAAAAAIA/AAAAAAAAAAA="}]}"#;
+
+    static GO: AtomicBool = AtomicBool::new(false);
 
     fn engine() -> TraceEngine {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().unwrap();
@@ -262,7 +289,7 @@ mod tests {
 
     fn shot(width: u32, height: u32) -> Shot {
         Shot {
-            scene: Arc::new(builtin::load(builtin::names()[0]).unwrap()),
+            scene: Arc::new(import::from_bytes("a.gltf", SCENE.as_bytes(), &mut |_| Err(String::new())).unwrap()),
             clips: [ClipId(0)].into(),
             time_s: 0.3,
             view: ViewSpec::Framed,
@@ -278,19 +305,21 @@ mod tests {
         let shot = shot(10, 8);
         let (mut engine, mut other) = (engine(), engine());
         let mut at_once = |samples| {
-            let pass = other.trace(&shot, 1, 0, samples).unwrap();
+            let pass = other.trace(&shot, 1, (0, samples), &GO).unwrap().unwrap();
             other.picture(&shot, pass, 1, samples).rgba
         };
         let one = at_once(1);
-        let mut picture = engine.refine(&shot, true).unwrap();
+        let mut picture = engine.refine(&shot, true, &GO).unwrap().unwrap();
         assert_eq!((picture.samples, &picture.rgba), (1, &one), "the first is that of one sample");
         let folder = tempfile::tempdir().unwrap();
         while !picture.is_final {
             if picture.samples == 31 {
+                let stopped = engine.refine(&shot, false, &AtomicBool::new(true)).unwrap();
+                assert!(stopped.is_none());
                 let still = StillJob { shot: shot.clone(), file: StillFile::Exact(folder.path().join("a.png")) };
                 engine.still(&still).unwrap();
             }
-            picture = engine.refine(&shot, false).unwrap();
+            picture = engine.refine(&shot, false, &GO).unwrap().unwrap();
         }
         assert_eq!(picture.samples, REFINED_SAMPLES);
         let expected = at_once(REFINED_SAMPLES);
@@ -303,25 +332,25 @@ mod tests {
     fn draft_has_the_size_of_its_divisor_and_reuses_memory() {
         let shot = shot(17, 9);
         let mut engine = engine();
-        let picture = engine.draft(&shot, 2).unwrap();
+        let picture = engine.draft(&shot, 2, &GO).unwrap().unwrap();
         assert_eq!((picture.width, picture.height, picture.rgba.len()), (9, 5, 4 * 9 * 5));
         let memory = picture.rgba.as_ptr();
         engine.recycle(picture.rgba);
-        assert_eq!(engine.draft(&shot, 2).unwrap().rgba.as_ptr(), memory);
+        assert_eq!(engine.draft(&shot, 2, &GO).unwrap().unwrap().rgba.as_ptr(), memory);
     }
 
     #[test]
     fn structure_and_scene_may_change_and_pictures_do_not_depend_on_the_past() {
         let first = shot(8, 5);
         let mut engine = engine();
-        let bvh2 = engine.draft(&first, 1).unwrap().rgba;
-        let list = engine.draft(&Shot { structure: "list".into(), ..first.clone() }, 1).unwrap().rgba;
+        let bvh2 = engine.draft(&first, 1, &GO).unwrap().unwrap().rgba;
+        let list = engine.draft(&Shot { structure: "list".into(), ..first.clone() }, 1, &GO).unwrap().unwrap().rgba;
         assert_eq!(bvh2, list);
-        let rest = engine.draft(&Shot { clips: [].into(), ..first.clone() }, 1).unwrap().rgba;
+        let rest = engine.draft(&Shot { clips: [].into(), ..first.clone() }, 1, &GO).unwrap().unwrap().rgba;
         assert_ne!(bvh2, rest);
-        assert_eq!(engine.draft(&shot(8, 5), 1).unwrap().rgba, bvh2, "the same scene loaded again");
-        let wrong = engine.draft(&Shot { structure: "no such".into(), ..first.clone() }, 1);
+        assert_eq!(engine.draft(&shot(8, 5), 1, &GO).unwrap().unwrap().rgba, bvh2, "the same scene loaded again");
+        let wrong = engine.draft(&Shot { structure: "no such".into(), ..first.clone() }, 1, &GO);
         assert!(wrong.is_err_and(|reason| reason.contains("no such")));
-        assert_eq!(engine.draft(&first, 1).unwrap().rgba, bvh2);
+        assert_eq!(engine.draft(&first, 1, &GO).unwrap().unwrap().rgba, bvh2);
     }
 }

@@ -198,7 +198,12 @@ impl Player {
         let shot = self.shot(now_s);
         let moves = runs || now_s < self.moved_s + SETTLE_S;
         let job = if moves { Job::Draft(shot, self.adapt.divisor()) } else { Job::Refine(shot) };
-        if self.posted.as_ref() == Some(&job) {
+        let is_posted = match (&self.posted, &job) {
+            // What a draft taught about the divisor is for the next motion.
+            (Some(Job::Draft(posted, _)), Job::Draft(shot, _)) => posted == shot,
+            (posted, job) => posted.as_ref() == Some(job),
+        };
+        if is_posted {
             return None;
         }
         self.is_in_flight = moves;
@@ -304,7 +309,7 @@ impl Player {
             self.clock.set_paused(now_s, false);
         }
         self.stage = stage;
-        self.picture_changes();
+        self.picture_changes(now_s);
     }
 
     /// Clips were exchanged: starts them and finds their key times.
@@ -312,12 +317,13 @@ impl Player {
         let playlist = &self.stage.playlist;
         self.stage.ticks = scrub::key_times(&self.stage.scene, playlist.clips());
         self.clock.restart(now_s, playlist.duration_s());
-        self.adapt.forget();
+        self.picture_changes(now_s);
     }
 
-    /// Frames will cost something else from now on.
-    pub(super) fn picture_changes(&mut self) {
+    /// Frames will cost something else from now on: first a coarse one, also while paused.
+    pub(super) fn picture_changes(&mut self, now_s: f64) {
         self.adapt.forget();
+        self.moved_s = now_s;
     }
 
     /// Shows a line for a while.

@@ -4,25 +4,30 @@ use std::{
     collections::VecDeque,
     io,
     path::PathBuf,
-    sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError},
+    sync::{
+        Arc, Condvar, Mutex, MutexGuard, PoisonError,
+        atomic::{AtomicBool, Ordering},
+    },
     thread::JoinHandle,
 };
 
-use super::request::{Job, Picture, Report, StillJob};
+use super::request::{Job, Picture, Report, Shot, StillJob};
 
 /// What does the work of the render thread.
 pub(super) trait Engine: Send + 'static {
-    /// A picture of one sample a pixel at the window's size over `divisor`.
+    /// A picture of one sample a pixel at the window's size over `divisor`; `None` when `stop` became true before
+    /// it was done.
     ///
     /// # Errors
     /// When the scene cannot be traced, in words.
-    fn draft(&mut self, shot: &super::request::Shot, divisor: u32) -> Result<Picture, String>;
+    fn draft(&mut self, shot: &Shot, divisor: u32, stop: &AtomicBool) -> Result<Option<Picture>, String>;
 
-    /// The next picture of a refinement: the first of a shot (`restart`) or one with more samples.
+    /// The next picture of a refinement: the first of a shot (`restart`) or one with more samples; `None` as in
+    /// [`Engine::draft`], with the refinement as it was before.
     ///
     /// # Errors
     /// As [`Engine::draft`].
-    fn refine(&mut self, shot: &super::request::Shot, restart: bool) -> Result<Picture, String>;
+    fn refine(&mut self, shot: &Shot, restart: bool, stop: &AtomicBool) -> Result<Option<Picture>, String>;
 
     /// Traces a still and writes it; the file it went to.
     ///
@@ -39,13 +44,16 @@ struct Inbox {
     job: Option<Job>,
     stills: VecDeque<StillJob>,
     spent: Vec<Vec<u8>>,
-    is_closed: bool,
 }
 
 #[derive(Debug, Default)]
 struct Mailbox {
     inbox: Mutex<Inbox>,
     changed: Condvar,
+    /// There is something in the inbox: a refinement should let go.
+    is_waited_for: AtomicBool,
+    /// The window is gone: a draft should let go too.
+    is_closed: AtomicBool,
 }
 
 impl Mailbox {
@@ -55,7 +63,10 @@ impl Mailbox {
     }
 
     fn change(&self, change: impl FnOnce(&mut Inbox)) {
-        change(&mut self.lock());
+        let mut inbox = self.lock();
+        change(&mut inbox);
+        self.is_waited_for.store(true, Ordering::Relaxed);
+        drop(inbox);
         self.changed.notify_one();
     }
 
@@ -65,11 +76,13 @@ impl Mailbox {
         loop {
             spent.append(&mut inbox.spent);
             if let Some(still) = inbox.stills.pop_front() {
+                // The rest of the inbox is still to be looked at.
                 return Some(Task::Still(still));
             }
-            if inbox.is_closed {
+            if self.is_closed.load(Ordering::Relaxed) {
                 return None;
             }
+            self.is_waited_for.store(false, Ordering::Relaxed);
             if let Some(job) = inbox.job.take() {
                 return Some(Task::Job(job));
             }
@@ -130,7 +143,7 @@ impl Worker {
 
 impl Drop for Worker {
     fn drop(&mut self) {
-        self.mailbox.change(|inbox| inbox.is_closed = true);
+        self.mailbox.change(|_| self.mailbox.is_closed.store(true, Ordering::Relaxed));
         if let Some(thread) = self.thread.take() {
             // A panic has been printed by its hook and noticed through `is_dead`.
             let _ = thread.join();
@@ -140,6 +153,7 @@ impl Drop for Worker {
 
 fn serve(mailbox: &Mailbox, mut engine: impl Engine, report: &impl Fn(Report)) {
     let mut refining = None;
+    let mut has_begun = false;
     let mut spent = Vec::new();
     while let Some(task) = mailbox.next(refining.is_some(), &mut spent) {
         spent.drain(..).for_each(|rgba| engine.recycle(rgba));
@@ -150,14 +164,19 @@ fn serve(mailbox: &Mailbox, mut engine: impl Engine, report: &impl Fn(Report)) {
             }
             Task::Job(Job::Draft(shot, divisor)) => {
                 refining = None;
-                engine.draft(&shot, divisor)
+                engine.draft(&shot, divisor, &mailbox.is_closed)
             }
-            Task::Job(Job::Refine(shot)) => engine.refine(refining.insert(shot), true),
+            Task::Job(Job::Refine(shot)) => {
+                has_begun = false;
+                engine.refine(refining.insert(shot), true, &mailbox.is_waited_for)
+            }
             Task::RefineOn => match &refining {
-                Some(shot) => engine.refine(shot, false),
+                Some(shot) => engine.refine(shot, !has_begun, &mailbox.is_waited_for),
                 None => continue,
             },
         };
+        let Some(result) = result.transpose() else { continue };
+        has_begun = true;
         if result.as_ref().map_or(true, |picture| picture.is_final) {
             refining = None;
         }
@@ -180,7 +199,7 @@ mod tests {
     use super::*;
     use crate::{
         geom::Aabb,
-        player::request::{FrameTimes, Shot, StillFile, ViewSpec},
+        player::request::{FrameTimes, StillFile, ViewSpec},
         render::{CameraView, Shading},
         scene::{Projection, Scene},
     };
@@ -226,16 +245,23 @@ mod tests {
     }
 
     impl Engine for Fake {
-        fn draft(&mut self, shot: &Shot, divisor: u32) -> Result<Picture, String> {
+        fn draft(&mut self, shot: &Shot, divisor: u32, _stop: &AtomicBool) -> Result<Option<Picture>, String> {
             if let Some(gate) = &self.gate {
                 gate.recv().map_err(|_| "closed".to_owned())?;
             }
-            if shot.time_s < 0.0 { Err("negative".to_owned()) } else { Ok(self.picture(shot, divisor, true)) }
+            if shot.time_s < 0.0 { Err("negative".to_owned()) } else { Ok(Some(self.picture(shot, divisor, true))) }
         }
 
-        fn refine(&mut self, shot: &Shot, restart: bool) -> Result<Picture, String> {
+        fn refine(&mut self, shot: &Shot, restart: bool, stop: &AtomicBool) -> Result<Option<Picture>, String> {
+            // A time below zero stands for a pass that takes for ever.
+            while shot.time_s < 0.0 {
+                if stop.load(Ordering::Relaxed) {
+                    return Ok(None);
+                }
+                std::thread::yield_now();
+            }
             self.samples = if restart { 1 } else { self.samples + 1 };
-            Ok(self.picture(shot, 1, self.samples == 4))
+            Ok(Some(self.picture(shot, 1, self.samples == 4)))
         }
 
         fn still(&mut self, job: &StillJob) -> Result<PathBuf, String> {
@@ -297,6 +323,19 @@ mod tests {
         assert!(receive.recv_timeout(Duration::from_millis(50)).is_err());
         worker.post(Job::Refine(shot(2.0)));
         assert_eq!(next_picture(&receive).samples, 1);
+    }
+
+    #[test]
+    fn refining_pass_lets_go_for_a_job_a_still_and_the_end() {
+        let (worker, receive) = start(None);
+        worker.post(Job::Refine(shot(-1.0)));
+        worker.post_still(StillJob { shot: shot(0.0), file: StillFile::Exact("a.png".into()) });
+        assert!(matches!(next(&receive), Report::Still(Ok(_))));
+        worker.post(Job::Draft(shot(2.0), 1));
+        assert!((next_picture(&receive).shot.time_s - 2.0).abs() < 1e-12);
+        worker.post(Job::Refine(shot(-1.0)));
+        drop(worker);
+        assert!(receive.recv().is_err());
     }
 
     #[test]

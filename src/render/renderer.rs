@@ -3,7 +3,7 @@
 use std::{
     sync::{
         Arc,
-        atomic::{AtomicU64, Ordering::Relaxed},
+        atomic::{AtomicBool, AtomicU64, Ordering::Relaxed},
     },
     vec::Vec,
 };
@@ -97,10 +97,26 @@ impl Renderer {
     /// # Panics
     /// When the machine lacks the SIMD level of `settings`.
     pub fn render(&mut self, world: &World, camera: &CameraView, settings: &RenderSettings, film: &mut Film) -> u64 {
+        self.render_until(world, camera, settings, film, &AtomicBool::new(false)).unwrap_or(0)
+    }
+
+    /// As [`Renderer::render`], but gives up soon after `stop` becomes true: then `None`, and the film's content is
+    /// unspecified.
+    ///
+    /// # Panics
+    /// As [`Renderer::render`].
+    pub fn render_until(
+        &mut self,
+        world: &World,
+        camera: &CameraView,
+        settings: &RenderSettings,
+        film: &mut Film,
+        stop: &AtomicBool,
+    ) -> Option<u64> {
         film.resize(film.width, film.height);
         film.display = !settings.shading.is_lit();
         if film.color.is_empty() {
-            return 0;
+            return Some(0);
         }
         self.begin(world);
         let ctx = self.context(world, camera, settings, [film.width, film.height]);
@@ -112,12 +128,15 @@ impl Renderer {
             .zip(film.instance.par_chunks_mut(rows))
             .enumerate()
             .for_each(|(index, ((color, depth), instance))| {
+                if stop.load(Relaxed) {
+                    return;
+                }
                 #[expect(clippy::cast_possible_truncation, reason = "below the film's height")]
                 let top = (index * BAND_ROWS) as u32;
                 let band = Band { top, color, depth, instance };
                 rays.fetch_add(dispatch(ctx.settings.simd, BandTask { ctx: &ctx, band }), Relaxed);
             });
-        rays.into_inner()
+        (!stop.load(Relaxed)).then(|| rays.into_inner())
     }
 
     /// Brings the lists up to the world's actors, instances and lights.
