@@ -99,6 +99,12 @@ impl Body {
         best
     }
 
+    /// Distance of `p` from the parts made of `stuff` alone.
+    pub fn distance_to(&self, stuff: Stuff, p: DVec3) -> f64 {
+        let of_stuff = self.groups.iter().filter(|group| group.stuff == stuff);
+        of_stuff.map(|group| group.distance(p)).fold(f64::INFINITY, f64::min)
+    }
+
     /// What the surface at `p` is made of: the group nearest to it.
     pub fn stuff(&self, p: DVec3) -> Stuff {
         let mut best = (f64::INFINITY, Stuff::Skin);
@@ -157,8 +163,8 @@ fn torso() -> Vec<(Solid, f64)> {
         (Solid::cone(v(-0.12, 1.215, -0.005), v(0.12, 1.215, -0.005), 0.062, 0.062), 0.04),
         // The hood lies on the shoulders; its rim runs round the neck.
         (Solid::ellipsoid(v(0.0, 1.262, -0.088), v(0.098, 0.060, 0.055)), 0.03),
-        (Solid::cone(v(0.060, 1.283, -0.050), v(0.012, 1.238, 0.076), 0.028, 0.014), 0.02),
-        (Solid::cone(v(-0.060, 1.283, -0.050), v(-0.012, 1.238, 0.076), 0.028, 0.014), 0.02),
+        (Solid::cone(v(0.060, 1.283, -0.050), v(0.012, 1.243, 0.066), 0.028, 0.014), 0.02),
+        (Solid::cone(v(-0.060, 1.283, -0.050), v(-0.012, 1.243, 0.066), 0.028, 0.014), 0.02),
     ]
 }
 

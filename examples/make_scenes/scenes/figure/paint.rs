@@ -45,7 +45,7 @@ pub fn finish(body: &Body, p: DVec3) -> Finish {
 }
 
 /// The garment at `p`; between hoodie and trousers the hem decides.
-fn stuff(body: &Body, p: DVec3) -> Stuff {
+pub fn stuff(body: &Body, p: DVec3) -> Stuff {
     match body.stuff(p) {
         Stuff::Hoodie | Stuff::Trousers if p.x.abs() < 0.25 => {
             if p.y > HEM[0] {
@@ -54,8 +54,17 @@ fn stuff(body: &Body, p: DVec3) -> Stuff {
                 Stuff::Trousers
             }
         }
+        // The hoodie's band runs a little way up the neck.
+        Stuff::Skin if on_neck(p) && body.distance_to(Stuff::Hoodie, p) < BAND => Stuff::Hoodie,
         other => other,
     }
+}
+
+/// How far the neck's band reaches.
+const BAND: f64 = 0.011;
+
+fn on_neck(p: DVec3) -> bool {
+    p.y > 1.2 && p.y < 1.335 && p.x.abs() < 0.1
 }
 
 /// 1 inside a shape whose signed distance is `d`, over an edge 1 mm wide.
@@ -125,6 +134,10 @@ fn hoodie(p: DVec3) -> (DVec3, f64) {
         color = color.lerp(WHITE, inside((p.y - 1.128).abs() - 0.016));
         color = color.lerp(SHOE, inside((p.y - 1.094).abs() - 0.008));
     }
+    let cord = (p.x.abs() - 0.024 - 0.05 * (1.24 - p.y)).abs() - 0.0034;
+    if p.z > 0.0 && p.y > 1.150 && p.y < 1.244 {
+        color = color.lerp(if p.y < 1.162 { SHOE } else { WHITE }, inside(cord));
+    }
     let rib = ribbed(p);
     color = color.lerp(HOODIE * 0.86, if rib { 1.0 } else { 0.0 });
     color *= mix(1.0, 0.8, inside(pocket(p).abs() - 0.0022));
@@ -170,9 +183,9 @@ fn shoe(p: DVec3) -> (DVec3, f64) {
     (color, mix(0.62, 0.5, toe_cap))
 }
 
-/// Height of the relief above the smooth surface in metres: ribs, seams, strands.
-pub fn relief(body: &Body, p: DVec3) -> f64 {
-    match stuff(body, p) {
+/// Height of the relief of `stuff` above the smooth surface in metres: ribs, seams, strands.
+pub fn relief(stuff: Stuff, p: DVec3) -> f64 {
+    match stuff {
         Stuff::Hair => 0.0030 * strand(p),
         Stuff::Hoodie if ribbed(p) => {
             let turn = if p.x.abs() > 0.25 {

@@ -111,7 +111,8 @@ fn material(glb: &mut Glb, body: &Body, source: &Source<'_>) -> usize {
 fn detailed_normal(body: &Body, p: DVec3) -> DVec3 {
     let smooth = sdf::normal(&|q| body.distance(q), p, 1.2e-3);
     let h = 1.0e-3;
-    let slope = |axis: DVec3| (paint::relief(body, p + axis * h) - paint::relief(body, p - axis * h)) / (2.0 * h);
+    let stuff = paint::stuff(body, p);
+    let slope = |axis: DVec3| (paint::relief(stuff, p + axis * h) - paint::relief(stuff, p - axis * h)) / (2.0 * h);
     let gradient = DVec3::new(slope(DVec3::X), slope(DVec3::Y), slope(DVec3::Z));
     let gradient = gradient - smooth * smooth.dot(gradient);
     let limit = (0.8 / gradient.length().max(1e-9)).min(1.0);
