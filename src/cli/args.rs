@@ -53,8 +53,7 @@ pub(crate) enum Command {
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Common options")]
 pub(crate) struct CommonArgs {
-    /// Worker threads [default: KINORA_THREADS, else what the scheduler granted, else all cores]
-    #[arg(long, global = true, value_name = "N")]
+    #[arg(long, global = true, value_name = "N", help = THREADS_HELP)]
     pub(crate) threads: Option<usize>,
     #[arg(long, global = true, value_name = "NAME", default_value = "bvh2", value_parser = values::accel, help = accel_help())]
     pub(crate) accel: AccelSpec,
@@ -88,6 +87,8 @@ pub(crate) enum Precision {
     /// Correctly rounded.
     Exact,
 }
+
+const THREADS_HELP: &str = "Worker threads [default: KINORA_THREADS, else what the scheduler granted, else all cores]";
 
 fn accel_help() -> String {
     format!("Structure over triangles, with its settings: NAME[:key=value,...]; there are {}", AccelKind::names())

@@ -12,7 +12,7 @@ const MAX_AREA: u64 = 1 << 27;
 const MAX_SAMPLES: i64 = 1 << 20;
 
 /// One of several named values.
-pub(crate) fn named<T, const N: usize>(values: [(&'static str, T); N]) -> impl TypedValueParser<Value = T> + Clone
+pub(crate) fn named<T, const N: usize>(values: [(&'static str, T); N]) -> impl TypedValueParser<Value = T>
 where
     T: Copy + Send + Sync + 'static,
 {
@@ -23,12 +23,12 @@ where
 }
 
 /// Samples a pixel.
-pub(crate) fn samples() -> impl TypedValueParser<Value = u32> + Clone {
+pub(crate) fn samples() -> impl TypedValueParser<Value = u32> {
     clap::value_parser!(u32).range(1..=MAX_SAMPLES)
 }
 
 /// What a pixel shows.
-pub(crate) fn shading() -> impl TypedValueParser<Value = Shading> + Clone {
+pub(crate) fn shading() -> impl TypedValueParser<Value = Shading> {
     named(Shading::ALL.map(|s| (s.name(), s)))
 }
 
@@ -42,13 +42,13 @@ pub(crate) enum SimdChoice {
 }
 
 /// A SIMD level or `auto`.
-pub(crate) fn simd() -> impl TypedValueParser<Value = SimdChoice> + Clone {
+pub(crate) fn simd() -> impl TypedValueParser<Value = SimdChoice> {
     let [a, b, c] = SimdLevel::ALL.map(|l| (l.name(), SimdChoice::Level(l)));
     named([("auto", SimdChoice::Auto), a, b, c])
 }
 
 /// The level over groups.
-pub(crate) fn top() -> impl TypedValueParser<Value = TopKind> + Clone {
+pub(crate) fn top() -> impl TypedValueParser<Value = TopKind> {
     named(TopKind::ALL.map(|k| (k.name(), k)))
 }
 

@@ -1,7 +1,7 @@
 //! YUV4MPEG2: 8-bit Y'`CbCr` with the BT.709 matrix in limited range, 4:2:0 or 4:4:4.
 //!
 //! In 4:2:0 a chroma sample is the mean of its 2 x 2 pixels, so it sits in their middle, which the header calls
-//! `420jpeg`. The header has no word for the matrix: players take BT.709 from the size, or are told. FFmpeg reads
+//! `420jpeg`. The header has no word for the matrix: players take BT.709 from the size, or are told. `FFmpeg` reads
 //! headers of up to 95 characters, so the stamp is a short one, left out where even that is too long.
 
 use super::{
@@ -19,7 +19,7 @@ pub enum Chroma {
     C444,
 }
 
-/// Longest line that FFmpeg reads, without its end.
+/// Longest line that `FFmpeg` reads, without its end.
 const MAX_LINE: usize = 95;
 
 /// What comes before the stamp in the header.

@@ -78,10 +78,10 @@ fn frames(text: &str) -> Result<FrameList, String> {
     text.parse()
 }
 
-fn exr_color() -> impl TypedValueParser<Value = ExrColor> + Clone {
+fn exr_color() -> impl TypedValueParser<Value = ExrColor> {
     values::named([("half", ExrColor::Half), ("float", ExrColor::Float)])
 }
 
-fn chroma() -> impl TypedValueParser<Value = Chroma> + Clone {
+fn chroma() -> impl TypedValueParser<Value = Chroma> {
     values::named([("420", Chroma::C420), ("444", Chroma::C444)])
 }
