@@ -2,6 +2,8 @@
 //!
 //! Cost: O(triangles) a ray, no build. Choose it for a handful of triangles, or to check another structure.
 
+#![expect(clippy::cast_possible_truncation, reason = "the number of triangles is checked by the build")]
+
 use super::{
     Accel, AccelConfig, AccelStats, BuildError, Closest, Counter, HitSink, Refit, TravRay, Violation, check_indices,
     query::blocks,

@@ -49,48 +49,59 @@ pub(super) struct PacketRays {
 }
 
 #[inline(always)]
-fn wide(row: &[f32; PACKET]) -> Row {
-    row.map(f64::from)
+fn widen(to: &mut Row, from: &[f32; PACKET]) {
+    for (to, &from) in to.iter_mut().zip(from) {
+        *to = f64::from(from);
+    }
 }
 
+/// True when all numbers have the same bits.
 #[inline(always)]
-fn wide3(rows: &[[f32; PACKET]; 3]) -> [Row; 3] {
-    [wide(&rows[0]), wide(&rows[1]), wide(&rows[2])]
+fn is_uniform(row: &[f32; PACKET]) -> bool {
+    row.iter().fold(0, |bits, x| bits | (x.to_bits() ^ row[0].to_bits())) == 0
 }
 
 impl PacketRays {
     /// Spreads up to [`PACKET`] rays, at least one; lanes without a ray repeat the last and must not be active.
     #[inline(always)]
     pub(super) fn new(rays: &[TravRay]) -> Self {
-        let mut rows = [[0.0_f32; PACKET]; 8];
+        let (narrow, wide) = ([0.0; PACKET], [0.0; PACKET]);
+        // Filled in place: a struct of this size made elsewhere would be copied.
+        let mut out = Self {
+            origin32: [narrow; 3],
+            dir32: [narrow; 3],
+            t_near32: narrow,
+            t_cull: narrow,
+            origin: [wide; 3],
+            dir: [wide; 3],
+            reach: wide,
+            t_near: wide,
+            t_far: wide,
+            t_limit: wide,
+            common_origin: false,
+        };
         for i in 0..PACKET {
             let range = rays[i.min(rays.len() - 1)].range();
-            let ([a, b, c], [d, e, f]) = (range.origin.to_array(), range.dir.to_array());
-            for (row, value) in rows.iter_mut().zip([a, b, c, d, e, f, range.t_near, range.t_far]) {
-                row[i] = value;
+            for axis in 0..3 {
+                out.origin32[axis][i] = range.origin[axis];
+                out.dir32[axis][i] = range.dir[axis];
             }
+            out.t_near32[i] = range.t_near;
+            out.t_cull[i] = range.t_far;
         }
-        let [a, b, c, d, e, f, t_near32, t_far32] = rows;
-        let (origin32, dir32) = ([a, b, c], [d, e, f]);
-        let mut reach = [0.0; PACKET];
+        for axis in 0..3 {
+            widen(&mut out.origin[axis], &out.origin32[axis]);
+            widen(&mut out.dir[axis], &out.dir32[axis]);
+        }
+        widen(&mut out.t_near, &out.t_near32);
+        widen(&mut out.t_far, &out.t_cull);
+        widen(&mut out.t_limit, &out.t_cull);
+        let [x, y, z] = &out.dir32;
         for i in 0..PACKET {
-            reach[i] = BOUND * f64::from(d[i].abs().max(e[i].abs()).max(f[i].abs()));
+            out.reach[i] = BOUND * f64::from(x[i].abs().max(y[i].abs()).max(z[i].abs()));
         }
-        let differing = (0..PACKET).fold(false, |any, i| any | (a[i] != a[0]) | (b[i] != b[0]) | (c[i] != c[0]));
-        let t_far = wide(&t_far32);
-        Self {
-            origin32,
-            dir32,
-            t_near32,
-            t_cull: t_far32,
-            origin: wide3(&origin32),
-            dir: wide3(&dir32),
-            reach,
-            t_near: wide(&t_near32),
-            t_far,
-            t_limit: t_far,
-            common_origin: !differing,
-        }
+        out.common_origin = out.origin32.iter().all(is_uniform);
+        out
     }
 
     /// Takes over a ray's best hit.

@@ -1,7 +1,7 @@
 //! The surface-area cost that builders minimise and refits watch.
 //!
 //! # Source
-//! Goldsmith and Salmon, "Automatic Creation of Object Hierarchies for Ray Tracing", 1987; MacDonald and Booth,
+//! Goldsmith and Salmon, "Automatic Creation of Object Hierarchies for Ray Tracing", 1987; `MacDonald` and Booth,
 //! "Heuristics for Ray Tracing Using Space Subdivision", 1990. Departure: a leaf costs by blocks of four triangles, not by
 //! triangles, since a block is tested as a whole.
 

@@ -41,15 +41,20 @@ pub trait Lanes:
     /// Writes all lanes to the front of a slice. Panics when it is too short.
     fn store(self, to: &mut [Self::Elem]);
     /// `self < other ? self : other`: `other` where either is NaN.
+    #[must_use]
     fn min(self, other: Self) -> Self;
     /// `self > other ? self : other`: `other` where either is NaN.
+    #[must_use]
     fn max(self, other: Self) -> Self;
     /// Absolute values.
+    #[must_use]
     fn abs(self) -> Self;
     /// `self * b + c`, rounded once or twice depending on the level: only for values that are used with a bound that
     /// covers both.
+    #[must_use]
     fn mul_add_loose(self, b: Self, c: Self) -> Self;
     /// `self * b - c`, as [`Lanes::mul_add_loose`].
+    #[must_use]
     fn mul_sub_loose(self, b: Self, c: Self) -> Self;
     /// Lanes where `self < other`; false where either is NaN.
     fn lt(self, other: Self) -> u32;
@@ -65,8 +70,10 @@ pub trait Halves: Lanes<Elem = f32> {
     /// Prepares [`Halves::swapped`].
     fn swap(on: bool) -> Self::Swap;
     /// `[2, 3, 0, 1]` when `swap` is on, unchanged else.
+    #[must_use]
     fn swapped(self, swap: Self::Swap) -> Self;
     /// `[2, 3, 2, 3]`.
+    #[must_use]
     fn high_half(self) -> Self;
     /// Lane 0.
     fn first(self) -> f32;

@@ -18,3 +18,6 @@ pub use dispatch::{Task, dispatch};
 pub use lanes::{Halves, Lanes, Simd};
 pub use level::SimdLevel;
 pub use scalar::Scalar;
+
+#[cfg(test)]
+mod tests;

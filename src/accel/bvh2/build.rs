@@ -4,6 +4,12 @@
 //! Wald, "On fast Construction of SAH-based Bounding Volume Hierarchies", 2007. Departures: all three axes are tried;
 //! leaves cost by blocks of four; small nodes are split by sorting; the depth is bounded by falling back to medians.
 
+#![expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "triangles are counted in u32, checked before; places of bins saturate and are clamped"
+)]
+
 use glam::Vec3A;
 use rayon::prelude::*;
 
@@ -366,8 +372,8 @@ impl Bins {
         out
     }
 
-    fn merge(mut self, other: Self) -> Self {
-        for (axis, from) in self.axes.iter_mut().zip(other.axes) {
+    fn merge(mut self, Self { axes, .. }: Self) -> Self {
+        for (axis, from) in self.axes.iter_mut().zip(axes) {
             for (bin, from) in axis[..self.used].iter_mut().zip(from) {
                 bin.bounds = bin.bounds.union(from.bounds);
                 bin.count += from.count;

@@ -1,3 +1,5 @@
+#![expect(clippy::cast_possible_truncation, reason = "the builder keeps the numbers of pairs and blocks below 2^28")]
+
 use std::ops::Range;
 
 use glam::Vec3;

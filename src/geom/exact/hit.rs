@@ -96,14 +96,13 @@ impl TriangleHit {
     pub fn tuv(&self, ray: &RayRange) -> [f32; 3] {
         let [(u, u_error), (v, v_error)] = self.quotients.barycentric();
         let t = agreed(self.t_low, self.t_high);
-        match (t, agreed(u - u_error, u + u_error), agreed(v - v_error, v + v_error)) {
-            (Some(t), Some(u), Some(v)) => [t, u, v],
-            _ => {
-                // A copy, so that the hit itself can stay in registers.
-                let copy = *self;
-                copy.tuv_exactly(ray)
-            }
+        let (u, v) = (agreed(u - u_error, u + u_error), agreed(v - v_error, v + v_error));
+        if let (Some(t), Some(u), Some(v)) = (t, u, v) {
+            return [t, u, v];
         }
+        // A copy, so that the hit itself can stay in registers.
+        let copy = *self;
+        copy.tuv_exactly(ray)
     }
 
     #[cold]
@@ -115,6 +114,7 @@ impl TriangleHit {
 
 /// The f32 that both ends of an interval round to; 0 is +0.
 #[inline(always)]
+#[expect(clippy::cast_possible_truncation, clippy::float_cmp, reason = "roundings are compared")]
 fn agreed(low: f64, high: f64) -> Option<f32> {
     let (low, high) = (low as f32, high as f32);
     (low == high).then_some(low + 0.0)

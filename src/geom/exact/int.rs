@@ -1,3 +1,9 @@
+#![expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_possible_wrap,
+    reason = "counts of bits are small; halves of wide products are taken on purpose"
+)]
+
 use std::cmp::Ordering;
 
 /// Limbs an [`Int`] can hold.

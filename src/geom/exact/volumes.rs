@@ -43,7 +43,7 @@ impl Scaled {
 
 /// The least exponent among `points`' coordinates; 0 when all are 0.
 fn least_exponent(points: &[Vec3]) -> i32 {
-    let least = points.iter().flat_map(|p| p.to_array()).map(|c| Scaled::new(c).exponent).min();
+    let least = points.iter().flat_map(Vec3::to_array).map(|c| Scaled::new(c).exponent).min();
     least.filter(|&e| e != i32::MAX).unwrap_or(0)
 }
 

@@ -1,0 +1,131 @@
+//! Every level against the portable one, bit for bit.
+
+use proptest::prelude::*;
+
+use super::{Halves, Lanes, Simd, SimdLevel, Task, dispatch};
+
+/// Bits of every operation's result on three rows of numbers; NaN of any kind is one value.
+struct Operations<'a> {
+    a: &'a [f32],
+    b: &'a [f32],
+    wide: (&'a [f64], &'a [f64]),
+}
+
+fn bits32(values: &[f32]) -> impl Iterator<Item = u64> + '_ {
+    values.iter().map(|v| if v.is_nan() { u64::MAX } else { u64::from(v.to_bits()) })
+}
+
+fn bits64(values: &[f64]) -> impl Iterator<Item = u64> + '_ {
+    values.iter().map(|v| if v.is_nan() { u64::MAX } else { v.to_bits() })
+}
+
+/// All operations on vectors of one type, over rows of 16 numbers; `zero` is any number.
+#[inline(always)]
+fn each<V: Lanes>(a: &[V::Elem], b: &[V::Elem], zero: V::Elem) -> (Vec<V::Elem>, u32, u32) {
+    let operations: [fn(V, V) -> V; 8] =
+        [|a, b| a + b, |a, b| a - b, |a, b| a * b, |a, b| a / b, V::min, V::max, |a, _| -a, |a, _| a.abs()];
+    let mut rows = Vec::new();
+    let (mut below, mut at_most) = (0, 0);
+    for operation in operations {
+        for first in (0..16).step_by(V::LEN) {
+            let mut out = [zero; 16];
+            operation(V::load(&a[first..]), V::load(&b[first..])).store(&mut out);
+            rows.extend(&out[..V::LEN]);
+        }
+    }
+    for first in (0..16).step_by(V::LEN) {
+        below |= V::load(&a[first..]).lt(V::load(&b[first..])) << first;
+        at_most |= V::load(&a[first..]).le(V::load(&b[first..])) << first;
+    }
+    (rows, below, at_most)
+}
+
+impl Task for Operations<'_> {
+    type Output = Vec<u64>;
+
+    #[inline(always)]
+    fn run<S: Simd>(self) -> Vec<u64> {
+        let mut out = Vec::new();
+        let mut add = |values: Vec<u64>, below: u32, at_most: u32| {
+            out.extend(values);
+            out.extend([u64::from(below), u64::from(at_most)]);
+        };
+        let (rows, below, at_most) = each::<S::F>(self.a, self.b, 0.0);
+        add(bits32(&rows).collect(), below, at_most);
+        let (rows, below, at_most) = each::<S::F4>(self.a, self.b, 0.0);
+        add(bits32(&rows).collect(), below, at_most);
+        let (rows, below, at_most) = each::<S::D>(self.wide.0, self.wide.1, 0.0);
+        add(bits64(&rows).collect(), below, at_most);
+        let (rows, below, at_most) = each::<S::D4>(self.wide.0, self.wide.1, 0.0);
+        add(bits64(&rows).collect(), below, at_most);
+        let four = S::F4::load(self.a);
+        for swap in [false, true] {
+            let mut row = [0.0; 4];
+            four.swapped(S::F4::swap(swap)).store(&mut row);
+            out.extend(bits32(&row));
+        }
+        let mut row = [0.0; 4];
+        four.high_half().store(&mut row);
+        out.extend(bits32(&row));
+        out.extend(bits32(&[four.first(), four.second()]));
+        let mut wide = [0.0; 4];
+        S::widen(four).store(&mut wide);
+        out.extend(bits64(&wide));
+        out
+    }
+}
+
+/// The fused forms may round once or twice: both are within the last place of the exact value's terms.
+struct Fused([f64; 3]);
+
+impl Task for Fused {
+    type Output = [f64; 2];
+
+    #[inline(always)]
+    fn run<S: Simd>(self) -> [f64; 2] {
+        let [a, b, c] = self.0.map(S::D4::splat);
+        let (mut add, mut sub) = ([0.0; 4], [0.0; 4]);
+        a.mul_add_loose(b, c).store(&mut add);
+        a.mul_sub_loose(b, c).store(&mut sub);
+        [add[0], sub[3]]
+    }
+}
+
+fn numbers() -> impl Strategy<Value = Vec<f32>> {
+    let special = prop::sample::select(vec![0.0, -0.0, f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 1e-45, f32::MAX]);
+    prop::collection::vec(prop_oneof![3 => any::<f32>(), 1 => special, 2 => -2.0_f32..2.0], 16)
+}
+
+proptest! {
+    #[test]
+    fn every_level_equals_the_portable_one(a in numbers(), b in numbers()) {
+        let wide = |row: &[f32]| row.iter().map(|&v| f64::from(v) * 1.000_000_1).collect::<Vec<_>>();
+        let (wide_a, wide_b) = (wide(&a), wide(&b));
+        let operations = || Operations { a: &a, b: &b, wide: (&wide_a, &wide_b) };
+        let due = dispatch(SimdLevel::Scalar, operations());
+        for level in SimdLevel::available() {
+            // Lanes differ in number, so rows are compared as a whole.
+            prop_assert_eq!(&dispatch(level, operations()), &due, "{}", level);
+        }
+    }
+
+    #[test]
+    fn fused_forms_stay_within_two_roundings(a in -1e3_f64..1e3, b in -1e3_f64..1e3, c in -1e3_f64..1e3) {
+        for level in SimdLevel::available() {
+            let [add, sub] = dispatch(level, Fused([a, b, c]));
+            let slack = f64::EPSILON * ((a * b).abs() + (a * b + c).abs() + (a * b - c).abs());
+            prop_assert!((add - (a * b + c)).abs() <= slack, "{}", level);
+            prop_assert!((sub - (a * b - c)).abs() <= slack, "{}", level);
+        }
+    }
+}
+
+#[test]
+fn levels_are_ordered_and_the_least_is_always_there() {
+    assert!(SimdLevel::Scalar.is_available());
+    assert!(SimdLevel::best().is_available());
+    assert_eq!(SimdLevel::available().last(), Some(SimdLevel::best()));
+    for level in SimdLevel::ALL {
+        assert_eq!(level.name().parse(), Ok(level));
+    }
+}
