@@ -11,10 +11,13 @@ use super::{
     pointer,
 };
 
+/// Bytes that a clip without keys takes, the reason why it is disabled included.
+const CLIP_BYTES: usize = size_of::<Clip>() + 384;
+
 /// All animations; nodes with a matrix that a channel drives get translation, rotation and scale instead.
 pub(super) fn import(cx: &Context<'_>, nodes: &mut [SceneNode], meshes: &[Mesh]) -> Step<Vec<Clip>> {
     let sources = cx.doc.animations.as_deref().unwrap_or_default();
-    cx.budget.take(sources.len(), size_of::<Clip>(), "animations")?;
+    cx.budget.take(sources.len(), CLIP_BYTES, "animations")?;
     let mut importer = ClipImporter { cx, nodes, meshes, ignored_pointers: Vec::new() };
     let clips = sources.iter().enumerate().map(|(i, text)| importer.clip(i, text.get())).collect();
     if let [first, rest @ ..] = importer.ignored_pointers.as_slice() {

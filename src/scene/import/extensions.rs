@@ -35,6 +35,9 @@ fn advice(extension: &str) -> &'static str {
     }
 }
 
+/// Most names that the lists of extensions may hold.
+const MAX_NAMES: usize = 1000;
+
 /// Checks the version and that every required extension is honoured.
 pub(super) fn check_required(doc: &Document<'_>) -> Step<()> {
     let asset = &doc.asset.0;
@@ -46,6 +49,11 @@ pub(super) fn check_required(doc: &Document<'_>) -> Step<()> {
     if let Some(least) = asset.min_version.as_deref().filter(|&v| v != "2.0") {
         let reason = format!("`{}`; this reads glTF 2.0", least.escape_debug());
         return Err(Problem::at("asset.minVersion", reason));
+    }
+    for (place, list) in [("extensionsUsed", &doc.extensions_used), ("extensionsRequired", &doc.extensions_required)] {
+        if list.len() > MAX_NAMES {
+            return Err(Problem::at(place, format!("names {} extensions; at most {MAX_NAMES} are read", list.len())));
+        }
     }
     match doc.extensions_required.iter().find(|e| !is_honoured(e)) {
         Some(extension) => Err(Problem::Unsupported {

@@ -15,6 +15,8 @@ use super::{
 
 /// Longest side of an image.
 const MAX_SIDE: u32 = 1 << 15;
+/// Bytes that reading an image's header may take.
+const MAX_HEADER: u64 = 32 << 20;
 /// Bytes that images being decoded at the same time may take beside the results.
 const MAX_IN_FLIGHT: u64 = 96 << 20;
 
@@ -121,7 +123,11 @@ impl<'c> Source<'c> {
 fn probe<'c>(cx: &Context<'_>, encoded: Encoded<'c>, place: &str) -> Result<Found<'c>, String> {
     let format = format_of(encoded.bytes()).ok_or("is no PNG, JPEG or WebP")?;
     let (width, height, in_flight) = {
-        let reader = ImageReader::with_format(Cursor::new(encoded.bytes()), format);
+        let mut reader = ImageReader::with_format(Cursor::new(encoded.bytes()), format);
+        // Room for headers and their compressed parts only.
+        let mut limits = Limits::default();
+        limits.max_alloc = Some(MAX_HEADER);
+        reader.limits(limits);
         let decoder = reader.into_decoder().map_err(|error| format!("cannot be decoded: {error}"))?;
         let (width, height) = decoder.dimensions();
         (width, height, decoder.total_bytes())

@@ -6,6 +6,10 @@ use serde::de::{DeserializeSeed, Deserializer, MapAccess, SeqAccess, Visitor};
 
 use super::super::context::Context;
 
+/// Most names that are collected, and most characters of each.
+const MAX_NAMES: usize = 1000;
+const MAX_LENGTH: usize = 200;
+
 pub(super) fn check(cx: &Context<'_>) {
     for (member, list) in
         [("extensionsUsed", &cx.doc.extensions_used), ("extensionsRequired", &cx.doc.extensions_required)]
@@ -61,7 +65,10 @@ impl<'de> Visitor<'de> for Walk<'_> {
     fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<(), A::Error> {
         while let Some(key) = map.next_key::<Key<'de>>()? {
             if self.in_extensions {
-                self.names.borrow_mut().insert(key.0.clone().into_owned());
+                let mut names = self.names.borrow_mut();
+                if names.len() < MAX_NAMES {
+                    names.insert(key.0.chars().take(MAX_LENGTH).collect());
+                }
             }
             if key.0 == "extras" {
                 map.next_value::<serde::de::IgnoredAny>()?;
