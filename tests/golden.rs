@@ -2,6 +2,13 @@
 //!
 //! `KINORA_BLESS=1 cargo test --test golden` writes them anew; say why in the commit.
 
+#![allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_possible_wrap,
+    clippy::case_sensitive_file_extension_comparisons,
+    reason = "small numbers, files of our own"
+)]
+
 #[path = "common/stage.rs"]
 mod stage;
 

@@ -1,5 +1,7 @@
 //! What pictures promise: the same bytes everywhere, light where light belongs, layers in order.
 
+#![allow(clippy::float_cmp, reason = "the same bytes are what is claimed")]
+
 #[path = "common/stage.rs"]
 mod stage;
 

@@ -9,7 +9,7 @@ use crate::{
 };
 
 /// Vertical field of view of automatic cameras: 30 degrees, close to what portraits are taken with.
-const FRAMING_FOV: f32 = 0.523_598_8;
+const FRAMING_FOV: f32 = std::f32::consts::FRAC_PI_6;
 /// Part of the picture that a framed box may fill.
 const FRAMING_FILL: f64 = 0.92;
 

@@ -30,7 +30,7 @@ impl Layer {
     /// True when both are one surface: two triangles of a part that share the edge or corner where the ray meets them.
     #[inline(always)]
     fn joins(&self, other: &Self) -> bool {
-        self.on_edge && other.on_edge && self.key.0 == other.key.0 && self.key.1 == other.key.1
+        self.on_edge && other.on_edge && (self.key.0.to_bits(), self.key.1) == (other.key.0.to_bits(), other.key.1)
     }
 }
 

@@ -33,7 +33,7 @@ impl Binding {
     /// The filtered texel at file coordinates `uv`.
     pub(crate) fn read(&self, pyramids: &[Pyramid], uv: Vec2, footprint: &Footprint) -> Vec4 {
         let footprint = Footprint { dx: self.turn(footprint.dx), dy: self.turn(footprint.dy) };
-        sample(&pyramids[self.pyramid as usize], &self.sampler, self.place(uv), &footprint)
+        sample(&pyramids[self.pyramid as usize], self.sampler, self.place(uv), &footprint)
     }
 }
 

@@ -1,5 +1,16 @@
 //! Camera rays, shading, film. Reads a finished world; never builds one.
 
+#![cfg_attr(
+    test,
+    allow(
+        clippy::float_cmp,
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        clippy::cast_possible_wrap,
+        reason = "tests compare exact values and cast small numbers"
+    )
+)]
+
 mod block;
 mod brdf;
 mod camera;

@@ -23,9 +23,8 @@ pub(crate) fn hash(x: u64) -> u32 {
     let mut z = x.wrapping_add(0x9E37_79B9_7F4A_7C15);
     z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
     z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-    #[expect(clippy::cast_possible_truncation, reason = "the upper half is what is wanted")]
-    let upper = ((z ^ (z >> 31)) >> 32) as u32;
-    upper
+    let [_, _, _, _, upper @ ..] = (z ^ (z >> 31)).to_le_bytes();
+    u32::from_le_bytes(upper)
 }
 
 /// Point `index` of the R2 sequence begun at `start`.

@@ -34,7 +34,7 @@ impl RayMaker {
         let (half, [near, far], perspective) = lens(&camera.projection, f64::from(size[0]) / f64::from(size[1]));
         let m = &camera.world_from_camera;
         let per_pixel = [2.0 * half[0] / f64::from(size[0]), -2.0 * half[1] / f64::from(size[1])];
-        let steps = [m.matrix3.x_axis * per_pixel[0], m.matrix3.y_axis * per_pixel[1]].map(|v| v.as_vec3());
+        let steps = [m.matrix3.x_axis * per_pixel[0], m.matrix3.y_axis * per_pixel[1]].map(DVec3::as_vec3);
         let corner = m.matrix3 * DVec3::new(-half[0], half[1], if perspective { -1.0 } else { 0.0 });
         let ahead = -m.matrix3.z_axis;
         let (origin, dir) = if perspective {

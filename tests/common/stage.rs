@@ -1,5 +1,6 @@
 //! Scenes for tests of pictures: parts with materials, lights, a camera.
-#![allow(dead_code, reason = "each test file uses its share")]
+#![allow(dead_code, unreachable_pub, reason = "each test file uses its share")]
+#![allow(clippy::cast_possible_truncation, reason = "small numbers")]
 
 use std::sync::Arc;
 

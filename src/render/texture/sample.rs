@@ -47,7 +47,7 @@ impl Plan {
 }
 
 /// The texture's linear RGBA at `uv` (v down), filtered over `footprint` as `sampler` says. Any float is taken.
-pub(crate) fn sample(pyramid: &Pyramid, sampler: &TexSampler, uv: Vec2, footprint: &Footprint) -> Vec4 {
+pub(crate) fn sample(pyramid: &Pyramid, sampler: TexSampler, uv: Vec2, footprint: &Footprint) -> Vec4 {
     if pyramid.level_count() == 1 && pyramid.level(0).width == 1 && pyramid.level(0).height == 1 {
         return pyramid.texel(0, 0, 0);
     }
@@ -64,7 +64,7 @@ pub(crate) fn sample(pyramid: &Pyramid, sampler: &TexSampler, uv: Vec2, footprin
 }
 
 /// Minified look-up at level of detail `lod`.
-fn between_levels(pyramid: &Pyramid, sampler: &TexSampler, lod: f32, uv: Vec2) -> Vec4 {
+fn between_levels(pyramid: &Pyramid, sampler: TexSampler, lod: f32, uv: Vec2) -> Vec4 {
     let last = pyramid.level_count() - 1;
     let lod = lod.min(last as f32);
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "between 0 and the last level")]
@@ -86,7 +86,7 @@ fn between_levels(pyramid: &Pyramid, sampler: &TexSampler, lod: f32, uv: Vec2) -
 }
 
 /// Look-up in one level.
-fn at_level(pyramid: &Pyramid, sampler: &TexSampler, filter: Filter, level: usize, uv: Vec2) -> Vec4 {
+fn at_level(pyramid: &Pyramid, sampler: TexSampler, filter: Filter, level: usize, uv: Vec2) -> Vec4 {
     let size = pyramid.level(level);
     let (u, v) = (fold(uv.x, sampler.wrap_u), fold(uv.y, sampler.wrap_v));
     let (x, y) = (u * size.width as f32, v * size.height as f32);
@@ -174,7 +174,7 @@ mod tests {
         u32::try_from(at).unwrap()
     }
 
-    fn slow_linear(p: &Pyramid, s: &TexSampler, uv: Vec2) -> Vec4 {
+    fn slow_linear(p: &Pyramid, s: TexSampler, uv: Vec2) -> Vec4 {
         let (w, h) = (p.level(0).width, p.level(0).height);
         let (x, y) = (f64::from(uv.x) * f64::from(w) - 0.5, f64::from(uv.y) * f64::from(h) - 0.5);
         let (ix, iy) = (x.floor(), y.floor());
@@ -197,7 +197,7 @@ mod tests {
                 let s = TexSampler { wrap_u, wrap_v, ..TexSampler::default() };
                 for i in 0..900 {
                     let uv = Vec2::new((i % 30) as f32 * 0.171 - 2.5, (i / 30) as f32 * 0.163 - 2.3);
-                    let (fast, slow) = (sample(&p, &s, uv, &Footprint::default()), slow_linear(&p, &s, uv));
+                    let (fast, slow) = (sample(&p, s, uv, &Footprint::default()), slow_linear(&p, s, uv));
                     assert!((fast - slow).abs().max_element() < 1e-5, "{s:?} {uv}: {fast} {slow}");
                 }
             }
@@ -210,7 +210,7 @@ mod tests {
         let s = TexSampler { mag: Filter::Nearest, wrap_u: Wrap::Mirror, ..TexSampler::default() };
         for (u, x) in [(0.1, 0), (0.3, 1), (0.99, 3), (1.01, 3), (1.3, 2), (1.99, 0), (2.01, 0), (-0.01, 0), (-0.3, 1)]
         {
-            let got = sample(&p, &s, Vec2::new(u, 0.1), &Footprint::default());
+            let got = sample(&p, s, Vec2::new(u, 0.1), &Footprint::default());
             assert_eq!(got, p.texel(0, x, 0), "{u}");
         }
     }
@@ -222,11 +222,11 @@ mod tests {
         for level in 1..=6usize {
             let width = (1 << level) as f32 / 64.0;
             let f = Footprint { dx: Vec2::new(width, 0.0), dy: Vec2::new(0.0, width) };
-            let got = sample(&p, &s, Vec2::splat(0.001), &f);
+            let got = sample(&p, s, Vec2::splat(0.001), &f);
             assert_eq!(got, p.texel(level, 0, 0), "level {level}");
         }
         let far = Footprint { dx: Vec2::splat(1e9), dy: Vec2::splat(1e9) };
-        assert_eq!(sample(&p, &s, Vec2::splat(0.4), &far), p.texel(6, 0, 0));
+        assert_eq!(sample(&p, s, Vec2::splat(0.4), &far), p.texel(6, 0, 0));
     }
 
     #[test]
@@ -238,8 +238,8 @@ mod tests {
         );
         let f = Footprint { dx: Vec2::new(1.0 / 64.0, 0.0), dy: Vec2::new(0.0, 4.0 / 64.0) };
         let s = TexSampler::default();
-        assert!(sample(&stripes, &s, Vec2::new(4.0 / 64.0, 0.5), &f).x > 0.95);
-        assert!(sample(&stripes, &s, Vec2::new(12.0 / 64.0, 0.5), &f).x < 0.05);
+        assert!(sample(&stripes, s, Vec2::new(4.0 / 64.0, 0.5), &f).x > 0.95);
+        assert!(sample(&stripes, s, Vec2::new(12.0 / 64.0, 0.5), &f).x < 0.05);
     }
 
     #[test]
@@ -247,7 +247,7 @@ mod tests {
         let p = pyramid(8, 8);
         let s = TexSampler { mip: None, min: Filter::Nearest, ..TexSampler::default() };
         let f = Footprint { dx: Vec2::splat(0.7), dy: Vec2::new(0.7, -0.7) };
-        assert_eq!(sample(&p, &s, Vec2::splat(0.001), &f), p.texel(0, 0, 0));
+        assert_eq!(sample(&p, s, Vec2::splat(0.001), &f), p.texel(0, 0, 0));
     }
 
     #[test]
@@ -259,7 +259,7 @@ mod tests {
                 for wrap in [Wrap::Repeat, Wrap::Mirror, Wrap::Clamp] {
                     let s = TexSampler { wrap_u: wrap, wrap_v: wrap, ..TexSampler::default() };
                     let f = Footprint { dx: Vec2::new(u, v), dy: Vec2::new(v, u) };
-                    let got = sample(&p, &s, Vec2::new(v, u), &f);
+                    let got = sample(&p, s, Vec2::new(v, u), &f);
                     assert!(got.x >= 0.0 && got.x <= 1.0, "{u} {v}: {got}");
                 }
             }
