@@ -164,10 +164,11 @@ fn threads_come_from_the_flag_then_the_environment() {
 }
 
 #[test]
-fn completions_know_commands_options_and_values_in_every_shell() {
-    for shell in ["bash", "zsh", "fish", "powershell", "elvish"] {
+fn completions_know_commands_and_options_in_every_shell() {
+    // The generators for the other two shells complete no values.
+    for (shell, values) in [("bash", true), ("zsh", true), ("fish", true), ("powershell", false), ("elvish", false)] {
         let script = stdout_of(&["completions", shell]);
-        for word in ["render", "shading", "eyelight", "overwrite"] {
+        for word in ["render", "shading", "overwrite"].into_iter().chain(values.then_some("eyelight")) {
             assert!(script.contains(word), "{shell} lacks {word}");
         }
     }
