@@ -1,5 +1,5 @@
 use super::{
-    World,
+    GroupFrame, World,
     sink::{Filter, GroupSink, Unfiltered},
 };
 use crate::{
@@ -42,10 +42,13 @@ impl World {
     fn closest<S: Simd, F: Filter>(&self, ray: &Ray, filter: F) -> Option<Hit> {
         let trav = TravRay::new(ray)?;
         let mut best = Closest::new(&trav);
-        let mut walk = self.top.walk(&self.groups, &trav);
-        while let Some(group) = walk.next(best.t_high()) {
-            let sink = GroupSink { layout: &group.layout, filter };
-            group.accel.closest::<S, (), _>(&group.triangles(), &trav, &mut best, &sink, &mut ());
+        if let [group] = &self.groups[..] {
+            group.closest::<S, F>(&trav, &mut best, filter);
+        } else {
+            let mut walk = self.top.walk(&self.groups, &trav);
+            while let Some(group) = walk.next(best.t_high()) {
+                group.closest::<S, F>(&trav, &mut best, filter);
+            }
         }
         best.hit(&trav)
     }
@@ -53,13 +56,32 @@ impl World {
     #[inline(always)]
     fn occluded<S: Simd, F: Filter>(&self, ray: &Ray, filter: F) -> bool {
         let Some(trav) = TravRay::new(ray) else { return false };
+        if let [group] = &self.groups[..] {
+            return group.occluded::<S, F>(&trav, filter);
+        }
+        let t_far = f64::from(trav.range().t_far);
         let mut walk = self.top.walk(&self.groups, &trav);
-        while let Some(group) = walk.next(f64::from(trav.range().t_far)) {
-            let sink = GroupSink { layout: &group.layout, filter };
-            if group.accel.occluded::<S, (), _>(&group.triangles(), &trav, &sink, &mut ()) {
+        while let Some(group) = walk.next(t_far) {
+            if group.occluded::<S, F>(&trav, filter) {
                 return true;
             }
         }
         false
+    }
+}
+
+// Kernels must be inlined into the function that carries the SIMD level's features. A closure would not be, so
+// nothing between the dispatch and a structure is one.
+impl GroupFrame {
+    #[inline(always)]
+    fn closest<S: Simd, F: Filter>(&self, ray: &TravRay, best: &mut Closest, filter: F) {
+        let sink = GroupSink { layout: &self.layout, filter };
+        self.accel.closest::<S, (), _>(&self.triangles(), ray, best, &sink, &mut ());
+    }
+
+    #[inline(always)]
+    fn occluded<S: Simd, F: Filter>(&self, ray: &TravRay, filter: F) -> bool {
+        let sink = GroupSink { layout: &self.layout, filter };
+        self.accel.occluded::<S, (), _>(&self.triangles(), ray, &sink, &mut ())
     }
 }

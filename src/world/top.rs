@@ -7,7 +7,7 @@ use std::str::FromStr;
 use super::{
     group::GroupFrame,
     slab::SlabRay,
-    top_tree::{TopTree, TreeWalk},
+    top_tree::{STACK, TopNode, TopTree},
 };
 use crate::accel::{SpecError, TravRay};
 
@@ -64,105 +64,105 @@ impl Top {
         }
     }
 
-    /// The groups that `ray` may hit, nearest first as far as the kind orders them.
+    /// Begins a walk over the groups that `ray` may hit.
     #[inline(always)]
     pub(crate) fn walk<'a>(&'a self, groups: &'a [GroupFrame], ray: &TravRay) -> Walk<'a> {
-        let order = if groups.len() <= 1 { Order::All } else { self.order(groups, ray) };
-        Walk { groups, next: 0, order }
-    }
-
-    fn order<'a>(&'a self, groups: &[GroupFrame], ray: &TravRay) -> Order<'a> {
         let slabs = SlabRay::new(ray);
-        let t_far = f64::from(ray.range().t_far);
-        match self.kind {
-            TopKind::List => Order::Listed(slabs),
-            TopKind::Bvh2 if groups.len() <= FLAT => Order::Sorted(Sorted::new(groups, &slabs, t_far)),
-            TopKind::Bvh2 => Order::Tree(self.tree.walk(slabs, t_far)),
+        let mut walk =
+            Walk { groups, nodes: self.tree.nodes(), slabs, stack: [(0.0, 0); STACK], waiting: 0, next_in_order: 0 };
+        if self.kind == TopKind::Bvh2 {
+            walk.next_in_order = groups.len();
+            let t_far = f64::from(ray.range().t_far);
+            if groups.len() <= FLAT { walk.push_sorted(t_far) } else { walk.push_node(0, t_far) }
         }
+        walk
     }
 }
 
-/// A walk over groups. A loop over it keeps what is done with each group at one place, so that traversals are compiled
-/// once there, for the caller's SIMD level (a closure would be compiled for none).
+/// The groups that a ray may hit, one after the other; nearest first except under [`TopKind::List`].
+///
+/// An iterator in all but name: the caller's best hit so far decides what still counts.
 #[derive(Debug)]
 pub(crate) struct Walk<'a> {
     groups: &'a [GroupFrame],
-    next: usize,
-    order: Order<'a>,
-}
-
-/// How a walk goes on.
-#[derive(Debug)]
-#[expect(clippy::large_enum_variant, reason = "lives on the stack for the time of a ray")]
-enum Order<'a> {
-    /// Every group, unseen.
-    All,
-    /// Every group whose box the ray meets.
-    Listed(SlabRay),
-    /// By entry.
-    Sorted(Sorted),
-    /// By the tree.
-    Tree(TreeWalk<'a>),
+    /// Of the tree; empty when there is none, and the stack then holds groups.
+    nodes: &'a [TopNode],
+    slabs: SlabRay,
+    /// What waits, the next last: a lower bound of its entry, and the node or group.
+    stack: [(f32, u32); STACK],
+    waiting: usize,
+    next_in_order: usize,
 }
 
 impl<'a> Walk<'a> {
-    /// The next group that the ray may hit no later than `t_far`.
+    /// The next group that the ray may hit at `t_far` or before.
     #[inline(always)]
     pub(crate) fn next(&mut self, t_far: f64) -> Option<&'a GroupFrame> {
-        if matches!(self.order, Order::All) {
-            let group = self.groups.get(self.next);
-            self.next += 1;
-            return group;
+        while self.next_in_order < self.groups.len() {
+            let group = &self.groups[self.next_in_order];
+            self.next_in_order += 1;
+            if self.slabs.entry(&group.bounds, t_far).is_some() {
+                return Some(group);
+            }
         }
-        self.next_of_many(t_far)
+        while self.waiting > 0 {
+            self.waiting -= 1;
+            let (entry, number) = self.stack[self.waiting];
+            if f64::from(entry) > t_far {
+                continue;
+            }
+            match self.nodes.get(number as usize) {
+                None => return self.groups.get(number as usize),
+                Some(node) if node.leaf => return self.groups.get(node.link as usize),
+                Some(node) => self.push_children(node.link, t_far),
+            }
+        }
+        None
     }
 
-    fn next_of_many(&mut self, t_far: f64) -> Option<&'a GroupFrame> {
-        let number = match &mut self.order {
-            Order::All => return None,
-            Order::Listed(slabs) => {
-                let rest = self.groups.get(self.next..)?;
-                let skip = rest.iter().position(|group| slabs.entry(&group.bounds, t_far).is_some())?;
-                self.next += skip + 1;
-                self.next - 1
-            }
-            Order::Sorted(sorted) => {
-                let (entry, number) = *sorted.met[..sorted.count].get(self.next)?;
-                self.next += 1;
-                if entry > t_far {
-                    return None;
-                }
-                number
-            }
-            Order::Tree(walk) => walk.next(t_far)? as usize,
-        };
-        self.groups.get(number)
-    }
-}
-
-/// At most [`FLAT`] groups, in order of entry.
-#[derive(Debug)]
-struct Sorted {
-    met: [(f64, usize); FLAT],
-    count: usize,
-}
-
-impl Sorted {
-    fn new(groups: &[GroupFrame], slabs: &SlabRay, t_far: f64) -> Self {
-        let mut met = [(0.0, 0_usize); FLAT];
-        let mut count = 0;
-        for (number, group) in groups.iter().enumerate() {
-            let Some(entry) = slabs.entry(&group.bounds, t_far) else { continue };
-            let mut at = count;
-            while at > 0 && met[at - 1].0 > entry {
-                met[at] = met[at - 1];
+    /// Pushes the groups that the ray meets, the nearest last.
+    #[inline(always)]
+    #[expect(clippy::cast_possible_truncation, reason = "at most FLAT groups")]
+    fn push_sorted(&mut self, t_far: f64) {
+        for (number, group) in self.groups.iter().enumerate() {
+            let Some(entry) = self.slabs.entry(&group.bounds, t_far) else { continue };
+            let entry = below(entry);
+            let mut at = self.waiting;
+            while at > 0 && self.stack[at - 1].0 < entry {
+                self.stack[at] = self.stack[at - 1];
                 at -= 1;
             }
-            met[at] = (entry, number);
-            count += 1;
+            self.stack[at] = (entry, number as u32);
+            self.waiting += 1;
         }
-        Self { met, count }
     }
+
+    #[inline(always)]
+    fn push_node(&mut self, node: u32, t_far: f64) {
+        let Some(TopNode { aabb, .. }) = self.nodes.get(node as usize) else { return };
+        if let Some(entry) = self.slabs.entry(aabb, t_far) {
+            self.stack[self.waiting] = (below(entry), node);
+            self.waiting += 1;
+        }
+    }
+
+    /// Pushes those of two sibling nodes that the ray meets, the nearer one last.
+    #[inline(always)]
+    fn push_children(&mut self, first: u32, t_far: f64) {
+        let from = self.waiting;
+        self.push_node(first, t_far);
+        self.push_node(first + 1, t_far);
+        if self.waiting == from + 2 && self.stack[from].0 < self.stack[from + 1].0 {
+            self.stack.swap(from, from + 1);
+        }
+    }
+}
+
+/// An `f32` that is not above `entry`.
+#[inline(always)]
+#[expect(clippy::cast_possible_truncation, reason = "moved down past the rounding")]
+fn below(entry: f64) -> f32 {
+    (entry as f32).next_down()
 }
 
 #[cfg(test)]
