@@ -178,7 +178,7 @@ mod tests {
         };
         assert_eq!(at_second(0, [1, 2, 0, 4]), Ok([9, 1, 0, 0x82]));
         assert_eq!(at_second(1, [0, 2, 1, 0]), Ok([10, 1, 0xff, 0x7f]));
-        assert_eq!(at_second(0x42, [1, 0, 0, 0]), Ok([10 ^ 16, 0, 0, 0x80]));
+        assert_eq!(at_second(0x42, [1, 0, 0, 0]), Ok([26, 0, 0, 0x80]));
         assert!(at_second(0x10, [0; 4]).is_err() && at_second(3, [0; 4]).is_err());
     }
 
