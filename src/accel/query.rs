@@ -42,15 +42,25 @@ impl HitSink for AnyHit {
 /// Magnitudes up to which f32 node tests cannot overflow: 2^60.
 pub(super) const ORDINARY_MAX: f32 = 1_152_921_504_606_846_976.0;
 
-/// Relative widening of reciprocals: 6 * 2^-24, see [`TravRay::inv_near`].
-pub(super) const WIDEN: f32 = 6.0 / 16_777_216.0;
+/// Relative widening of reciprocals: 6 * 2^-24.
+const WIDEN: f32 = 6.0 / 16_777_216.0;
+
+/// Factor of the reciprocal direction for entries: with it `fl(fl(plane - o) * inv)` is at most `(plane - o) / d` where
+/// that is not negative.
+///
+/// Four roundings (reciprocal, widening, difference, product) make a relative error below 4.01 u with u = 2^-24,
+/// and the widening is 6 u.
+pub(super) const SHRINK: f32 = 1.0 - WIDEN;
+
+/// Factor of the reciprocal direction for exits: `fl(fl(plane - o) * inv)` is at least `(plane - o) / d` where that is not
+/// negative, up to an underflow of 2^-150.
+pub(super) const GROW: f32 = 1.0 + WIDEN;
 
 /// A ray with what traversals derive from it, made once a ray.
 #[derive(Clone, Copy, Debug)]
 pub struct TravRay {
     range: RayRange,
-    inv_near: Vec3,
-    inv_far: Vec3,
+    inv: Vec3,
     ordinary: bool,
 }
 
@@ -61,24 +71,18 @@ impl TravRay {
     #[inline(always)]
     pub fn new(ray: &Ray) -> Option<Self> {
         let (t_near, t_far) = (ray.t_near, ray.t_far.min(f32::MAX));
+        // Adding +0 turns -0 into +0. Ordinary numbers are finite.
+        let dir = ray.dir + Vec3::ZERO;
+        let ordinary = is_ordinary(ray.origin, dir);
+        let finite = ordinary || (ray.origin.is_finite() && dir.is_finite());
         // A NaN t_far would be lost in `min`, so it is looked at itself.
-        let valid = ray.origin.is_finite()
-            && ray.dir.is_finite()
-            && ray.dir != Vec3::ZERO
-            && !ray.t_far.is_nan()
-            && t_near <= t_far
-            && t_far >= 0.0;
-        if !valid {
+        if !finite || dir == Vec3::ZERO || ray.t_far.is_nan() || !(t_near <= t_far && t_far >= 0.0) {
             return None;
         }
-        // Adding +0 turns -0 into +0.
-        let dir = ray.dir + Vec3::ZERO;
-        let inv = Vec3::ONE / dir;
         Some(Self {
             range: RayRange { origin: ray.origin, dir, t_near: t_near.max(0.0) + 0.0, t_far: t_far + 0.0 },
-            inv_near: inv * (1.0 - WIDEN),
-            inv_far: inv * (1.0 + WIDEN),
-            ordinary: is_ordinary(ray.origin, dir),
+            inv: Vec3::ONE / dir,
+            ordinary,
         })
     }
 
@@ -88,21 +92,10 @@ impl TravRay {
         &self.range
     }
 
-    /// Reciprocal direction, shrunk: `fl(fl(plane - o) * inv_near)` is at most `(plane - o) / d` where that is not
-    /// negative.
-    ///
-    /// Four roundings (reciprocal, widening, difference, product) make a relative error below 4.01 u with u = 2^-24,
-    /// and the widening is 6 u. Infinite where the direction is 0.
+    /// Reciprocal direction; infinite where the direction is 0. See [`SHRINK`] and [`GROW`].
     #[inline(always)]
-    pub fn inv_near(&self) -> Vec3 {
-        self.inv_near
-    }
-
-    /// Reciprocal direction, grown: `fl(fl(plane - o) * inv_far)` is at least `(plane - o) / d` where that is not
-    /// negative, up to an underflow of 2^-150.
-    #[inline(always)]
-    pub fn inv_far(&self) -> Vec3 {
-        self.inv_far
+    pub(super) fn inv(&self) -> Vec3 {
+        self.inv
     }
 
     /// True when f32 node tests on boxes within 2^60 of 0 neither overflow nor lose precision by underflow.

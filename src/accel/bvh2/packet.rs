@@ -9,7 +9,7 @@ use crate::{
     accel::{
         Closest, Counter, HitSink, TravRay,
         packet::{PACKET, PacketRays, bits},
-        query::WIDEN,
+        query::{GROW, SHRINK},
     },
     geom::Triangles,
     simd::{Lanes, Simd},
@@ -31,7 +31,7 @@ impl<S: Simd> PacketNode<S> {
         let dir = load3::<S>(&packet.dir32);
         // As `TravRay::new`.
         let inv = [S::F::splat(1.0) / dir[0], S::F::splat(1.0) / dir[1], S::F::splat(1.0) / dir[2]];
-        let (shrink, grow) = (S::F::splat(1.0 - WIDEN), S::F::splat(1.0 + WIDEN));
+        let (shrink, grow) = (S::F::splat(SHRINK), S::F::splat(GROW));
         Self {
             origin: load3::<S>(&packet.origin32),
             inv_near: [inv[0] * shrink, inv[1] * shrink, inv[2] * shrink],

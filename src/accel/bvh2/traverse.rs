@@ -5,7 +5,11 @@ use super::{
     node::{Link, Pair},
 };
 use crate::{
-    accel::{Closest, Counter, HitSink, TravRay, block::BlockRay, query::ORDINARY_MAX},
+    accel::{
+        Closest, Counter, HitSink, TravRay,
+        block::BlockRay,
+        query::{GROW, ORDINARY_MAX, SHRINK},
+    },
     simd::{Halves, Lanes, Simd, branch_barrier},
 };
 
@@ -33,8 +37,8 @@ trait NodeTest: Copy {
 ///
 /// # Proof that no box is missed
 /// Take an ordinary ray ([`TravRay::is_ordinary`]) and a box within 2^60 of 0. On an axis with `d != 0` the lanes hold
-/// `a = fl(fl(near - o) * inv_near)` and `b = fl(fl(far - o) * inv_far)`; nothing overflows (2^61 * 2^61) and only the
-/// products may underflow, by less than 2^-149. By the bounds of [`TravRay::inv_near`] and [`TravRay::inv_far`], `a` is at most the
+/// `a = fl(fl(near - o) * fl(inv * SHRINK))` and `b = fl(fl(far - o) * fl(inv * GROW))`; nothing overflows (2^61 * 2^61) and only the
+/// products may underflow, by less than 2^-149. By the bounds of [`SHRINK`] and [`GROW`], `a` is at most the
 /// exact entry where that is not negative, and negative or 0 elsewhere, where the ray's `t_near >= 0` takes its place in
 /// the maximum; `b` is at least the exact exit where that is not negative, and a negative exit misses in truth. So with
 /// 2^-126 of slack on the comparison an exact meeting within `[t_near, limit]` is never lost. On an axis with `d = 0`
@@ -57,13 +61,12 @@ impl<S: Simd> FastNode<S> {
     #[inline(always)]
     fn new(ray: &TravRay, limit: f32) -> Self {
         let range = ray.range();
-        let (near, far) = (ray.inv_near().to_array(), ray.inv_far().to_array());
-        let dir = range.dir.to_array();
-        let inv = |axis: usize| S::F4::load(&[near[axis], near[axis], -far[axis], -far[axis]]);
+        let (inv, dir) = (ray.inv().to_array(), range.dir.to_array());
+        let widen = S::F4::load(&[SHRINK, SHRINK, -GROW, -GROW]);
         let swap = |axis: usize| S::F4::swap(dir[axis] < 0.0);
         Self {
             origin: range.origin.to_array().map(S::F4::splat),
-            inv: [inv(0), inv(1), inv(2)],
+            inv: inv.map(|inv| S::F4::splat(inv) * widen),
             swap: [swap(0), swap(1), swap(2)],
             limits: S::F4::load(&[range.t_near, range.t_near, -limit, -limit]),
             t_near: range.t_near,
