@@ -26,7 +26,7 @@ fn has_display() -> bool {
 
 fn kinora(command: &str, args: &[&str]) -> Command {
     let mut program = Command::new(env!("CARGO_BIN_EXE_kinora"));
-    program.arg(command).args(args).args(["--threads", "2"]).stdin(Stdio::null());
+    program.arg(command).args(["--threads", "2"]).args(args).stdin(Stdio::null());
     program
 }
 
