@@ -131,13 +131,12 @@ fn screen() -> Option<image::RgbImage> {
     Some(image::RgbImage::from_fn(u32::try_from(width).unwrap(), u32::try_from(height).unwrap(), pixel))
 }
 
-/// Mean difference of two pictures' channels, in 1/255, over the right half, where no figures are.
+/// Mean difference of two pictures' channels, in 1/255, over the rows between figures and scrub bar.
 fn difference(screen: &image::RgbImage, picture: &image::RgbImage, row_of: impl Fn(u32) -> u32) -> f64 {
     let (width, height) = picture.dimensions();
     let (mut sum, mut count) = (0.0, 0.0);
-    // The scrub bar and what it shades lie in the lowest rows.
-    for y in 0..height * 3 / 4 {
-        for x in width / 2..width {
+    for y in height * 7 / 20..height * 4 / 5 {
+        for x in 0..width {
             let (a, b) = (screen.get_pixel(x, y), picture.get_pixel(x, row_of(y)));
             sum += (0..3).map(|c| f64::from(a[c].abs_diff(b[c]))).sum::<f64>();
             count += 3.0;
