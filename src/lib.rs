@@ -9,7 +9,7 @@
 #![deny(unsafe_code)]
 #![deny(clippy::print_stdout)]
 
-pub use glam;
+pub use {glam, rayon};
 
 #[cfg(test)]
 extern crate self as kinora;
@@ -29,3 +29,8 @@ pub mod simd;
 pub mod world;
 
 pub use error::{Error, Result};
+
+/// The commands and the example of the README are tested with the documentation.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
