@@ -254,11 +254,11 @@ mod tests {
 
         fn refine(&mut self, shot: &Shot, restart: bool, stop: &AtomicBool) -> Result<Option<Picture>, String> {
             // A time below zero stands for a pass that takes for ever.
-            while shot.time_s < 0.0 {
-                if stop.load(Ordering::Relaxed) {
-                    return Ok(None);
+            if shot.time_s < 0.0 {
+                while !stop.load(Ordering::Relaxed) {
+                    std::thread::yield_now();
                 }
-                std::thread::yield_now();
+                return Ok(None);
             }
             self.samples = if restart { 1 } else { self.samples + 1 };
             Ok(Some(self.picture(shot, 1, self.samples == 4)))
