@@ -1,4 +1,11 @@
 //! `traverse/<scene>/<structure>/<rays>`: rays against a dented sphere, one thread, exact precision.
+#![allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_possible_wrap,
+    clippy::cast_sign_loss,
+    clippy::float_cmp,
+    reason = "small numbers; results are compared bit for bit"
+)]
 
 #[path = "meshes/mod.rs"]
 mod meshes;

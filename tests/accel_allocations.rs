@@ -1,4 +1,11 @@
 //! Rays, packets and refits allocate nothing in steady state.
+#![allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_possible_wrap,
+    clippy::cast_sign_loss,
+    clippy::float_cmp,
+    reason = "small numbers; results are compared bit for bit"
+)]
 
 use std::{
     alloc::{GlobalAlloc, Layout, System},

@@ -1,5 +1,12 @@
 //! Every structure against brute force: the same hit bit for bit, fresh and refitted, singly and in packets, at every
 //! SIMD level.
+#![allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_possible_wrap,
+    clippy::cast_sign_loss,
+    clippy::float_cmp,
+    reason = "small numbers; results are compared bit for bit"
+)]
 
 #[path = "common/trace.rs"]
 mod trace;
@@ -25,14 +32,14 @@ fn displaced(mesh: &Mesh) -> Mesh {
     Mesh { positions, indices: mesh.indices.clone() }
 }
 
-fn bits(hit: &Option<Hit>) -> Option<[u32; 4]> {
+fn bits(hit: Option<Hit>) -> Option<[u32; 4]> {
     hit.map(|h| [h.t.to_bits(), h.u.to_bits(), h.v.to_bits(), h.prim.0])
 }
 
 /// All kinds, levels, fresh and refitted, singly and in packets, against `list`.
 fn conforms(name: &str, mesh: &Mesh, rays: &[Ray]) {
     let list = build(AccelKind::List, mesh);
-    let due: Vec<_> = closest(&list, &mesh.prims(), rays, SimdLevel::Scalar).iter().map(bits).collect();
+    let due: Vec<_> = closest(&list, &mesh.prims(), rays, SimdLevel::Scalar).into_iter().map(bits).collect();
     for &kind in AccelKind::ALL.iter().filter(|&&k| k != AccelKind::List) {
         let fresh = build(kind, mesh);
         let elsewhere = displaced(mesh);
@@ -53,7 +60,7 @@ fn conforms(name: &str, mesh: &Mesh, rays: &[Ray]) {
                 assert_eq!(blocked_together, blocked, "{name}: {what} {kind} at {level}, in packets");
                 for (i, due) in due.iter().enumerate() {
                     let context = || format!("{name}: {what} {kind} at {level}, ray {i} {:?}", rays[i]);
-                    assert_eq!(&bits(&hits[i]), due, "{}", context());
+                    assert_eq!(&bits(hits[i]), due, "{}", context());
                     assert_eq!(blocked[i], due.is_some(), "{}", context());
                 }
             }
@@ -438,7 +445,7 @@ fn builds_do_not_depend_on_the_number_of_threads() {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
         pool.install(|| {
             let accel = build(AccelKind::Bvh2, &mesh);
-            let hits: Vec<_> = closest(&accel, &mesh.prims(), &rays, SimdLevel::best()).iter().map(bits).collect();
+            let hits: Vec<_> = closest(&accel, &mesh.prims(), &rays, SimdLevel::best()).into_iter().map(bits).collect();
             (format!("{:?}", accel.stats()), hits)
         })
     };
@@ -457,7 +464,9 @@ fn decay_is_one_when_fresh_and_grows_when_a_mesh_explodes() {
     let mut exploded = apart.clone();
     for corners in exploded.positions.chunks_exact_mut(3) {
         let flight = random.vec3() * 20.0;
-        corners.iter_mut().for_each(|c| *c += flight);
+        for corner in corners {
+            *corner += flight;
+        }
     }
     let mut refitted = built.clone();
     assert_eq!(built.refit_into(&mut refitted, &exploded.prims()), Refit::Done);
@@ -507,7 +516,7 @@ fn settings_change_the_tree_but_no_answer() {
     let mesh = soup(2000, 0.2, 77);
     let rays = rays_at(&mesh, 300, 78);
     let reference = build(AccelKind::Bvh2, &mesh);
-    let due: Vec<_> = closest(&reference, &mesh.prims(), &rays, SimdLevel::best()).iter().map(bits).collect();
+    let due: Vec<_> = closest(&reference, &mesh.prims(), &rays, SimdLevel::best()).into_iter().map(bits).collect();
     for text in ["bvh2:bins=2", "bvh2:bins=64,leaf_blocks=1", "bvh2:leaf_blocks=2"] {
         let spec: AccelSpec = text.parse().expect("known settings");
         let accel = spec.build(&mesh.prims()).expect("the mesh builds");
@@ -515,7 +524,7 @@ fn settings_change_the_tree_but_no_answer() {
         if text != "bvh2:leaf_blocks=2" {
             assert_ne!(accel.stats(), reference.stats(), "{text}");
         }
-        let hits: Vec<_> = closest(&accel, &mesh.prims(), &rays, SimdLevel::best()).iter().map(bits).collect();
+        let hits: Vec<_> = closest(&accel, &mesh.prims(), &rays, SimdLevel::best()).into_iter().map(bits).collect();
         assert_eq!(hits, due, "{text}");
     }
 }

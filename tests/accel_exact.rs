@@ -1,4 +1,11 @@
 //! The leaf test against rational arithmetic: hits, order and every rounding.
+#![allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_possible_wrap,
+    clippy::cast_sign_loss,
+    clippy::float_cmp,
+    reason = "small numbers; results are compared bit for bit"
+)]
 
 #[path = "common/trace.rs"]
 mod trace;

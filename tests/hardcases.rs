@@ -1,4 +1,11 @@
 //! The shared collection of rays with exact answers, through every structure at every SIMD level.
+#![allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_possible_wrap,
+    clippy::cast_sign_loss,
+    clippy::float_cmp,
+    reason = "small numbers; results are compared bit for bit"
+)]
 
 mod common;
 #[path = "common/trace.rs"]

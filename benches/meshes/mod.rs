@@ -1,5 +1,12 @@
 //! Meshes and rays that the structure benches share: made here, the same on every machine.
 #![allow(dead_code, reason = "each bench uses its share")]
+#![allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_possible_wrap,
+    clippy::cast_sign_loss,
+    clippy::float_cmp,
+    reason = "small numbers; results are compared bit for bit"
+)]
 
 use kinora::{
     geom::{Ray, Triangles},
@@ -7,19 +14,19 @@ use kinora::{
 };
 
 /// An owned mesh.
-pub struct Mesh {
-    pub positions: Vec<Vec3>,
-    pub indices: Vec<[u32; 3]>,
+pub(crate) struct Mesh {
+    pub(crate) positions: Vec<Vec3>,
+    pub(crate) indices: Vec<[u32; 3]>,
 }
 
 impl Mesh {
-    pub fn prims(&self) -> Triangles<'_> {
+    pub(crate) fn prims(&self) -> Triangles<'_> {
         Triangles { positions: &self.positions, indices: &self.indices, topology_epoch: 1 }
     }
 }
 
 /// A dented sphere of `2 * n * n` triangles; `phase` moves the dents.
-pub fn dented_sphere(n: usize, phase: f64) -> Mesh {
+pub(crate) fn dented_sphere(n: usize, phase: f64) -> Mesh {
     let vertex = |i: usize| {
         let (row, column) = (i / n, i % n);
         let (a, b) = (
@@ -41,7 +48,7 @@ pub fn dented_sphere(n: usize, phase: f64) -> Mesh {
 }
 
 /// A pinhole picture of the unit ball, in 4 x 4 tiles.
-pub fn camera_rays(side: usize) -> Vec<Ray> {
+pub(crate) fn camera_rays(side: usize) -> Vec<Ray> {
     let tiles = side / 4;
     let pixel = |i: usize| {
         let (tile, inner) = (i / 16, i % 16);
@@ -53,7 +60,7 @@ pub fn camera_rays(side: usize) -> Vec<Ray> {
 }
 
 /// Rays between scattered points of the box around the unit ball.
-pub fn scattered_rays(count: usize) -> Vec<Ray> {
+pub(crate) fn scattered_rays(count: usize) -> Vec<Ray> {
     let mut state = 1_u64;
     let mut unit = || {
         state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);

@@ -2,7 +2,7 @@
 //! types are named only by `dispatch`, which has checked the machine.
 #![allow(unused_unsafe, reason = "intrinsics of x86-64's baseline are safe to call, those beside them are not")]
 
-#[expect(clippy::wildcard_imports, reason = "dozens of intrinsics")]
+#[allow(clippy::wildcard_imports, reason = "dozens of intrinsics")]
 use std::arch::x86_64::*;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 

@@ -1,5 +1,12 @@
 //! Rays against structures, and the answers in rational arithmetic.
 #![allow(dead_code, reason = "each test file uses its share")]
+#![allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_possible_wrap,
+    clippy::cast_sign_loss,
+    clippy::float_cmp,
+    reason = "small numbers; results are compared bit for bit"
+)]
 
 use kinora::{
     accel::{AnyAccel, AnyHit, Closest, PACKET, TravRay},
@@ -13,24 +20,24 @@ use num_traits::{Signed, Zero};
 
 /// An owned mesh.
 #[derive(Clone, Debug, Default)]
-pub struct Mesh {
-    pub positions: Vec<Vec3>,
-    pub indices: Vec<[u32; 3]>,
+pub(crate) struct Mesh {
+    pub(crate) positions: Vec<Vec3>,
+    pub(crate) indices: Vec<[u32; 3]>,
 }
 
 impl Mesh {
     /// Triangles without shared vertices.
-    pub fn soup(corners: &[[Vec3; 3]]) -> Self {
+    pub(crate) fn soup(corners: &[[Vec3; 3]]) -> Self {
         let positions = corners.iter().flatten().copied().collect();
         let indices = (0..corners.len() as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
         Self { positions, indices }
     }
 
-    pub fn prims(&self) -> Triangles<'_> {
+    pub(crate) fn prims(&self) -> Triangles<'_> {
         Triangles { positions: &self.positions, indices: &self.indices, topology_epoch: 1 }
     }
 
-    pub fn corners(&self, prim: usize) -> [Vec3; 3] {
+    pub(crate) fn corners(&self, prim: usize) -> [Vec3; 3] {
         self.prims().corners(PrimId(prim as u32))
     }
 }
@@ -57,7 +64,7 @@ impl Task for ClosestTask<'_> {
 }
 
 /// The closest hit of every ray.
-pub fn closest(accel: &AnyAccel, prims: &Triangles<'_>, rays: &[Ray], level: SimdLevel) -> Vec<Option<Hit>> {
+pub(crate) fn closest(accel: &AnyAccel, prims: &Triangles<'_>, rays: &[Ray], level: SimdLevel) -> Vec<Option<Hit>> {
     dispatch(level, ClosestTask { accel, prims: *prims, rays })
 }
 
@@ -76,7 +83,7 @@ impl Task for OccludedTask<'_> {
 }
 
 /// Whether every ray is blocked.
-pub fn occluded(accel: &AnyAccel, prims: &Triangles<'_>, rays: &[Ray], level: SimdLevel) -> Vec<bool> {
+pub(crate) fn occluded(accel: &AnyAccel, prims: &Triangles<'_>, rays: &[Ray], level: SimdLevel) -> Vec<bool> {
     dispatch(level, OccludedTask(ClosestTask { accel, prims: *prims, rays }))
 }
 
@@ -112,7 +119,7 @@ impl Task for PacketTask<'_> {
 }
 
 /// Closest hits and occlusion of rays taken in packets of differing length.
-pub fn in_packets(
+pub(crate) fn in_packets(
     accel: &AnyAccel,
     prims: &Triangles<'_>,
     rays: &[Ray],
@@ -122,7 +129,7 @@ pub fn in_packets(
 }
 
 /// A finite f32 as a rational.
-pub fn rational(value: f32) -> BigRational {
+pub(crate) fn rational(value: f32) -> BigRational {
     BigRational::from_float(value).expect("finite")
 }
 
@@ -145,7 +152,7 @@ fn dot(a: &Q3, b: &Q3) -> BigRational {
 }
 
 /// Exact t, u, v where the ray hits the closed triangle; the plane equation and edge functions taken literally.
-pub fn exact_hit(ray: &Ray, corners: &[Vec3; 3]) -> Option<[BigRational; 3]> {
+pub(crate) fn exact_hit(ray: &Ray, corners: &[Vec3; 3]) -> Option<[BigRational; 3]> {
     let finite = |v: Vec3| v.is_finite();
     let usable = finite(ray.origin) && finite(ray.dir) && corners.iter().all(|&c| finite(c));
     if !usable || ray.t_near.is_nan() || ray.t_far.is_nan() {
@@ -170,7 +177,7 @@ pub fn exact_hit(ray: &Ray, corners: &[Vec3; 3]) -> Option<[BigRational; 3]> {
 }
 
 /// A rational rounded to the nearest f32, ties to even.
-pub fn round(value: &BigRational) -> f32 {
+pub(crate) fn round(value: &BigRational) -> f32 {
     if value.is_zero() {
         return 0.0;
     }
@@ -198,7 +205,7 @@ fn to_f64(value: &BigRational) -> f64 {
 }
 
 /// Closest hit by rationals over a whole mesh: least t, then least number.
-pub fn exact_closest(ray: &Ray, mesh: &Mesh) -> Option<Hit> {
+pub(crate) fn exact_closest(ray: &Ray, mesh: &Mesh) -> Option<Hit> {
     if ray.dir == Vec3::ZERO {
         return None;
     }
@@ -221,10 +228,10 @@ pub fn exact_closest(ray: &Ray, mesh: &Mesh) -> Option<Hit> {
 
 /// A small generator of reproducible numbers (Vigna's splitmix64).
 #[derive(Clone, Debug)]
-pub struct Random(pub u64);
+pub(crate) struct Random(pub(crate) u64);
 
 impl Random {
-    pub fn bits(&mut self) -> u64 {
+    pub(crate) fn bits(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
         let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
@@ -232,16 +239,16 @@ impl Random {
     }
 
     /// Below `n`.
-    pub fn below(&mut self, n: usize) -> usize {
+    pub(crate) fn below(&mut self, n: usize) -> usize {
         (self.bits() % n as u64) as usize
     }
 
     /// In [-1, 1).
-    pub fn unit(&mut self) -> f32 {
+    pub(crate) fn unit(&mut self) -> f32 {
         (self.bits() >> 40) as f32 / 8_388_608.0 - 1.0
     }
 
-    pub fn vec3(&mut self) -> Vec3 {
+    pub(crate) fn vec3(&mut self) -> Vec3 {
         Vec3::new(self.unit(), self.unit(), self.unit())
     }
 }

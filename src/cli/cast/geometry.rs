@@ -27,8 +27,12 @@ pub(super) fn read(files: &[String], settings: &Settings) -> Result<Frames, CliE
     let mut frames = Vec::with_capacity(files.len());
     for file in files {
         let corners = read_corners(file, settings)?;
-        if corners.len() / 3 > i32::MAX as usize {
-            return Err(CliError::usage(format!("{file}: {} triangles, at most {} fit", corners.len() / 3, i32::MAX)));
+        if corners.len() >= u32::MAX as usize {
+            return Err(CliError::usage(format!(
+                "{file}: {} triangles, at most {} fit",
+                corners.len() / 3,
+                u32::MAX / 3
+            )));
         }
         let first: &Vec<Vec3> = frames.first().unwrap_or(&corners);
         if first.len() != corners.len() {
@@ -74,6 +78,7 @@ fn scene_corners(file: &str, settings: &Settings) -> Result<Vec<Vec3>, CliError>
 }
 
 /// Gives equal numbers to corners with equal bits in every frame, in order of first appearance.
+#[expect(clippy::cast_possible_truncation, reason = "there are fewer than 2^32 corners")]
 fn weld(frames: &[Vec<Vec3>]) -> Frames {
     let count = frames[0].len();
     let mut classes = vec![0_u32; count];

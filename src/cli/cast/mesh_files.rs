@@ -1,5 +1,10 @@
 //! Small readers of .ply, .obj and .stl: positions and faces, all else is passed over. Faces of more than three corners
 //! become fans.
+#![expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "coordinates are rounded to f32; counts are checked; indices that do not fit name no vertex"
+)]
 
 use std::path::Path;
 
@@ -277,6 +282,8 @@ fn ply_header(content: &[u8]) -> Result<Header<'_>, String> {
 
 #[cfg(test)]
 mod tests {
+    use std::fmt::Write;
+
     use super::*;
 
     fn path() -> &'static Path {
@@ -338,7 +345,7 @@ mod tests {
             text += "facet normal 0 0 1\nouter loop\n";
             binary.extend([0; 12]);
             for corner in facet {
-                text += &format!("vertex {} {} {}\n", corner.x, corner.y, corner.z);
+                writeln!(text, "vertex {} {} {}", corner.x, corner.y, corner.z).expect("strings take all");
                 corner.to_array().iter().for_each(|c| binary.extend(c.to_le_bytes()));
             }
             text += "endloop\nendfacet\n";

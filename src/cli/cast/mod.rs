@@ -94,7 +94,7 @@ pub(crate) fn run(args: &CastArgs, settings: &Settings) -> Result<(), CliError> 
     if let Some(path) = &args.hits {
         let mut file = AtomicFile::create(path, &Unfinished::default())?;
         file.write(b"HIT1")?;
-        file.write(&((rays.len() / RAY_BYTES) as u32).to_le_bytes())?;
+        file.write(&u32::try_from(rays.len() / RAY_BYTES).unwrap_or(u32::MAX).to_le_bytes())?;
         file.write(&records)?;
         file.finish()?;
     }
