@@ -2,14 +2,15 @@
 
 use std::sync::Arc;
 
-use glam::{DAffine3, DVec3};
+use glam::{DAffine3, DVec3, Vec3};
 
 use super::{FrameConfig, FrameError, FrameLoop, RebuildPolicy, grouping::Grouping};
 use crate::{
+    accel::PACKET,
     anim::ActiveClip,
     geom::{Hit, Ray},
     scene::{ClipId, Scene},
-    simd::Scalar,
+    simd::{Scalar, Simd, SimdLevel, Task, dispatch},
     world::World,
 };
 
@@ -63,6 +64,54 @@ fn grouping_changes_no_hit() {
         assert!(hits(&single) == expected, "single at {time_s}");
         assert!(hits(&by_actor) == expected, "by actor at {time_s}");
         assert_eq!(by_motion.bounds(), single.bounds());
+    }
+}
+
+/// Packets of every length over a fan of rays, with one in eleven that is no ray.
+struct Together<'a>(&'a World, &'a [Ray]);
+
+impl Task for Together<'_> {
+    type Output = (Vec<Option<Hit>>, Vec<Option<Hit>>, Vec<bool>, Vec<bool>);
+
+    #[inline(always)]
+    fn run<S: Simd>(self) -> Self::Output {
+        let Self(world, rays) = self;
+        let singly = rays.iter().map(|ray| world.nearest_hit::<S>(ray)).collect();
+        let blocked_singly = rays.iter().map(|ray| world.is_blocked::<S>(ray)).collect();
+        let (mut hits, mut blocked) = (vec![None; rays.len()], Vec::new());
+        let (mut first, mut len) = (0, 1);
+        while first < rays.len() {
+            let end = rays.len().min(first + len);
+            world.nearest_hits::<S>(&rays[first..end], &mut hits[first..end]);
+            let mask = world.blocked::<S>(&rays[first..end]);
+            blocked.extend((0..end - first).map(|i| (mask >> i) & 1 == 1));
+            (first, len) = (end, len % PACKET + 1);
+        }
+        (singly, hits, blocked_singly, blocked)
+    }
+}
+
+#[test]
+fn packets_answer_as_single_rays_do() {
+    let ray = |i: u16| {
+        let (x, y) = (f32::from(i % 25) / 12.0 - 1.0, f32::from(i / 25) / 12.0 - 1.0);
+        let dir = if i % 11 == 0 { Vec3::NAN } else { Vec3::new(x * 0.5, y * 0.5, -1.0) };
+        Ray::new(Vec3::new(0.0, 0.3, 6.0), dir)
+    };
+    let rays: Vec<Ray> = (0..625).map(ray).collect();
+    for (accel, grouping) in [("list", Grouping::ByMotion), ("bvh2", Grouping::ByMotion), ("bvh2", Grouping::Single)] {
+        let mut frames = FrameLoop::with_grouping(config(accel, RebuildPolicy::Refit), grouping).unwrap();
+        for (i, scene) in (0_u8..).zip([figure(30), bodies(12), still()]) {
+            frames.add(Arc::new(scene), DAffine3::from_translation(DVec3::new(f64::from(i) - 1.0, 0.0, 0.0)));
+        }
+        let clip = at(0.7);
+        let world = frames.advance(&[&clip, &clip, &[]]).unwrap().0;
+        for level in SimdLevel::available() {
+            let (singly, together, blocked_singly, blocked) = dispatch(level, Together(&world, &rays));
+            assert!(singly.iter().flatten().count() > 20, "rays must hit something");
+            assert!(together == singly, "{accel} at {level}");
+            assert!(blocked == blocked_singly, "{accel} at {level}");
+        }
     }
 }
 

@@ -6,6 +6,7 @@
 //! hit is shared over groups, and boxes only prove misses.
 
 mod group;
+mod packet;
 mod query;
 mod sink;
 mod slab;
