@@ -33,7 +33,7 @@ impl World {
         }
         let best = &mut best[..rays.len()];
         for group in &self.groups {
-            let sinks = [GroupSink { layout: &*group.layout, filter: Unfiltered }; PACKET];
+            let sinks = [GroupSink { layout: &group.layout, filter: Unfiltered }; PACKET];
             let sinks = &sinks[..rays.len()];
             group.accel.closest_packet::<S, (), _>(&group.triangles(), packet, active, best, sinks, &mut ());
         }
@@ -57,7 +57,7 @@ impl World {
         };
         let packet = &packet[..rays.len()];
         for group in &self.groups {
-            let sinks = [GroupSink { layout: &*group.layout, filter: Unfiltered }; PACKET];
+            let sinks = [GroupSink { layout: &group.layout, filter: Unfiltered }; PACKET];
             let sinks = &sinks[..rays.len()];
             let open = active & !blocked;
             if open == 0 {
