@@ -9,7 +9,7 @@
 //! ```
 //!
 //! The triangle is hit when D is not 0, none of U, V, W has the sign opposite to D, and t lies in the ray's range.
-//! [`Estimate`] evaluates the volumes in f64 with a proven bound; where a sign, a comparison or a rounding is in
+//! The volumes are evaluated in f64 with a proven bound; where a sign, a comparison or a rounding is in
 //! doubt, integers decide: the coordinates are multiples of a power of two, so the volumes are integers of at most
 //! 837 bits. Nothing is allocated.
 
