@@ -1,7 +1,7 @@
 //! Blocks of 4 x 4 pixels: their rays are traced together, then shaded, then lit.
 //!
-//! Camera rays and secondary rays meet the world at one place each, so that the traversals behind them are
-//! compiled once a SIMD level; shading between them is plain code, compiled once.
+//! Camera rays and secondary rays go in packets and meet the world at one place each, so that the traversals behind
+//! them are compiled once a SIMD level; shading between them is plain code, compiled once.
 
 use std::{cell::Cell, ops::Range};
 
@@ -34,6 +34,15 @@ pub(crate) struct Probe {
     pub(crate) light: Vec3,
     /// Width of the footprint in metres, for the alpha of what is in the way.
     pub(crate) width: f32,
+}
+
+impl Probe {
+    /// Fills places without a probe.
+    const NONE: Self = Self {
+        ray: Ray { origin: Vec3::ZERO, dir: Vec3::ZERO, t_near: 0.0, t_far: 0.0 },
+        light: Vec3::ZERO,
+        width: 0.0,
+    };
 }
 
 /// What the samples of one pixel have found so far.
@@ -100,10 +109,18 @@ impl Block {
         for layer in 0..LAYERS {
             let mut points: [Option<Point>; LANES] = [None; LANES];
             let mut any = false;
-            for (lane, point) in lanes.iter_mut().zip(&mut points) {
+            let mut nearest: [Option<Hit>; LANES] = [None; LANES];
+            if layer == 0 {
+                trace::<S>(ctx, &lanes, &mut nearest);
+            }
+            for (i, (lane, point)) in lanes.iter_mut().zip(&mut points).enumerate() {
                 let Some(active) = lane else { continue };
                 self.rays += 1;
-                let hit = closest::<S>(ctx, active);
+                let hit = match nearest[i] {
+                    None if layer == 0 => None,
+                    Some(hit) if is_seen(ctx, &active.ray, None, &hit) => Some(hit),
+                    _ => next_seen::<S>(ctx, active),
+                };
                 let Some(hit) = hit else {
                     *lane = None;
                     continue;
@@ -142,11 +159,21 @@ impl Block {
         points: &mut [Option<Point>; LANES],
     ) {
         for number in 0..probe_count(ctx) {
-            for (lane, point) in lanes.iter().zip(points.iter_mut()) {
+            let mut probes = [Probe::NONE; LANES];
+            let mut owners = [0; LANES];
+            let mut count = 0;
+            for (i, (lane, point)) in lanes.iter().zip(points.iter()).enumerate() {
                 let (Some(lane), Some(point)) = (lane, point) else { continue };
                 let Some(probe) = point.probe(ctx, number, &lane.random) else { continue };
-                self.rays += 1;
-                *point.color() += probe.light * transmittance::<S>(ctx, &probe);
+                (probes[count], owners[count]) = (probe, i);
+                count += 1;
+            }
+            self.rays += count as u64;
+            let arriving = transmittances::<S>(ctx, &probes[..count]);
+            for i in 0..count {
+                if let Some(point) = &mut points[owners[i]] {
+                    *point.color() += probes[i].light * arriving[i];
+                }
             }
         }
     }
@@ -206,36 +233,59 @@ fn shade(ctx: &FrameContext<'_>, ray: &Ray, hit: &Hit) -> Point {
     }
 }
 
-/// The next thing that a camera ray sees.
-///
-/// Nearly always that is simply the nearest hit, which is found without asking anybody on the way; only where that
-/// one does not count (a culled face, a hole, a layer already met) the ray goes again with the filter. Its range is
-/// closed and layers up to the last are refused, so none is lost and none is met twice.
+/// The nearest hit of every camera ray, whether it counts or not: nearly always it does.
 #[inline(always)]
-fn closest<S: Simd>(ctx: &FrameContext<'_>, lane: &Lane) -> Option<Hit> {
-    if lane.last.is_none() {
-        let nearest = ctx.world.nearest_hit::<S>(&lane.ray)?;
-        if is_seen(ctx, &lane.ray, None, &nearest) {
-            return Some(nearest);
+fn trace<S: Simd>(ctx: &FrameContext<'_>, lanes: &[Option<Lane>; LANES], nearest: &mut [Option<Hit>; LANES]) {
+    let mut rays = [Probe::NONE.ray; LANES];
+    let mut owners = [0; LANES];
+    let mut count = 0;
+    for (i, lane) in lanes.iter().enumerate() {
+        if let Some(lane) = lane {
+            (rays[count], owners[count]) = (lane.ray, i);
+            count += 1;
         }
     }
+    let mut hits = [None; LANES];
+    ctx.world.nearest_hits::<S>(&rays[..count], &mut hits[..count]);
+    for i in 0..count {
+        nearest[owners[i]] = hits[i];
+    }
+}
+
+/// The next thing that a camera ray sees where the nearest hit does not count: a culled face, a hole, a layer already met.
+///
+/// The range is closed and layers up to the last are refused, so none is lost and none is met twice.
+#[inline(always)]
+fn next_seen<S: Simd>(ctx: &FrameContext<'_>, lane: &Lane) -> Option<Hit> {
     let after = lane.last.as_ref().map(Layer::new);
     let rest = Ray { t_near: lane.last.map_or(lane.ray.t_near, |hit| hit.t), ..lane.ray };
     ctx.world.closest_hit::<S, _>(&rest, &|hit: &Hit| is_seen(ctx, &lane.ray, after.as_ref(), hit))
 }
 
-/// The part of a probe's light that arrives.
+/// The part of each probe's light that arrives.
 ///
 /// Blended layers dim it in order of (t, instance, prim), so that the product does not depend on the order in which a
 /// structure finds them.
 #[inline(always)]
-fn transmittance<S: Simd>(ctx: &FrameContext<'_>, probe: &Probe) -> f32 {
-    if !ctx.pierced {
-        return if ctx.world.is_blocked::<S>(&probe.ray) { 0.0 } else { 1.0 };
+fn transmittances<S: Simd>(ctx: &FrameContext<'_>, probes: &[Probe]) -> [f32; LANES] {
+    let mut arriving = [1.0; LANES];
+    if ctx.pierced {
+        for (arriving, probe) in arriving.iter_mut().zip(probes) {
+            let layers = Cell::new(Layers::default());
+            let stopped = ctx.world.is_occluded::<S, _>(&probe.ray, &|hit: &Hit| ctx.stops(probe.width, hit, &layers));
+            *arriving = if stopped { 0.0 } else { layers.into_inner().transmittance() };
+        }
+        return arriving;
     }
-    let layers = Cell::new(Layers::default());
-    if ctx.world.is_occluded::<S, _>(&probe.ray, &|hit: &Hit| ctx.stops(probe.width, hit, &layers)) {
-        return 0.0;
+    let mut rays = [Probe::NONE.ray; LANES];
+    for (ray, probe) in rays.iter_mut().zip(probes) {
+        *ray = probe.ray;
     }
-    layers.into_inner().transmittance()
+    let blocked = ctx.world.blocked::<S>(&rays[..probes.len()]);
+    for (i, arriving) in arriving.iter_mut().enumerate() {
+        if (blocked >> i) & 1 == 1 {
+            *arriving = 0.0;
+        }
+    }
+    arriving
 }

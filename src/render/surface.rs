@@ -13,6 +13,10 @@ use crate::{
     scene::MeshPart,
 };
 
+/// Least share that an axis has of the largest error: on a coordinate plane the error is 0, and a ray that starts a
+/// denormal number above the plane could be decided by integers only.
+const LEAST_ERROR: f32 = 1.0 / 256.0;
+
 /// Bound of the relative rounding error of a barycentric point: seven roundings.
 const POINT_ERROR: f32 = 7.0 * 0.5 * f32::EPSILON / (1.0 - 7.0 * 0.5 * f32::EPSILON);
 
@@ -133,6 +137,7 @@ impl Surface {
         let [a, b, c] = patch.corners;
         let point = a * w + b * u + c * v;
         let error = ((a * w).abs() + (b * u).abs() + (c * v).abs()) * POINT_ERROR;
+        let error = error.max(Vec3::splat(error.max_element() * LEAST_ERROR));
         let side = if info.mirrored { -1.0 } else { 1.0 };
         // Outward by the file's winding, before it is turned to the viewer.
         let outward = unit_or(patch.cross * side, view);

@@ -1,6 +1,9 @@
+//! Packets of rays: what single rays answer, bit for bit, faster where rays run close together.
+
 use super::{
-    World,
+    GroupFrame, World,
     sink::{GroupSink, Unfiltered},
+    top::FLAT,
 };
 use crate::{
     accel::{Closest, PACKET, TravRay},
@@ -8,79 +11,130 @@ use crate::{
     simd::Simd,
 };
 
-/// Worlds of more groups answer packets ray by ray: their top level is walked for single rays.
-const FLAT: usize = 8;
+/// The rays of a packet that can hit anything.
+struct Packet {
+    /// Lanes that are not active repeat an active one.
+    rays: [TravRay; PACKET],
+    active: u32,
+    /// Number of lanes, active or not.
+    len: usize,
+}
+
+impl Packet {
+    /// `None` when no ray can hit anything.
+    #[inline(always)]
+    fn new(rays: &[Ray]) -> Option<Self> {
+        let mut first = None;
+        let mut made = [None; PACKET];
+        for (made, ray) in made.iter_mut().zip(rays) {
+            *made = TravRay::new(ray);
+            first = first.or(*made);
+        }
+        let mut packet = Self { rays: [first?; PACKET], active: 0, len: rays.len() };
+        for (i, made) in made.iter().enumerate() {
+            if let Some(ray) = made {
+                packet.rays[i] = *ray;
+                packet.active |= 1 << i;
+            }
+        }
+        Some(packet)
+    }
+
+    /// The first active ray: it stands for all where only speed is at stake.
+    #[inline(always)]
+    fn leader(&self) -> &TravRay {
+        &self.rays[self.active.trailing_zeros() as usize]
+    }
+
+    #[inline(always)]
+    fn rays(&self) -> &[TravRay] {
+        &self.rays[..self.len]
+    }
+}
 
 impl World {
-    /// [`World::nearest_hit`] of up to [`PACKET`] rays at once, quickest for rays close together; `hits` has a place for
-    /// each. No allocation.
+    /// Writes to `hits` what [`World::nearest_hit`] answers for each of `rays`.
+    ///
+    /// Pays when the rays start close together or run the same way; never wrong when they do not. No allocation.
     ///
     /// # Panics
-    /// When there are more rays than [`PACKET`], or not as many places.
+    /// When there are more than [`PACKET`] rays or fewer hits than rays.
     #[inline(always)]
     pub fn nearest_hits<S: Simd>(&self, rays: &[Ray], hits: &mut [Option<Hit>]) {
-        assert_eq!(rays.len(), hits.len(), "one place a ray");
-        let Some((packet, active)) = packet(rays).filter(|_| self.groups.len() <= FLAT) else {
-            for (hit, ray) in hits.iter_mut().zip(rays) {
-                *hit = self.nearest_hit::<S>(ray);
-            }
-            return;
-        };
-        let packet = &packet[..rays.len()];
-        let mut best = [Closest::new(&packet[0]); PACKET];
-        for (best, ray) in best.iter_mut().zip(packet) {
+        assert!(rays.len() <= PACKET && rays.len() <= hits.len(), "at most {PACKET} rays, a hit for each");
+        hits.fill(None);
+        let Some(packet) = Packet::new(rays) else { return };
+        let mut best = [Closest::new(packet.leader()); PACKET];
+        for (best, ray) in best.iter_mut().zip(packet.rays()) {
             *best = Closest::new(ray);
         }
-        let best = &mut best[..rays.len()];
-        for group in &self.groups {
-            let sinks = [GroupSink { layout: &group.layout, filter: Unfiltered }; PACKET];
-            let sinks = &sinks[..rays.len()];
-            group.accel.closest_packet::<S, (), _>(&group.triangles(), packet, active, best, sinks, &mut ());
+        if self.groups.len() <= FLAT {
+            let order = self.top.order(&self.groups, packet.leader());
+            for &number in &order[..self.groups.len()] {
+                self.groups[number].closest_packet::<S>(packet.rays(), packet.active, &mut best[..packet.len]);
+            }
+        } else {
+            for i in 0..packet.len {
+                if (packet.active >> i) & 1 == 1 {
+                    let mut walk = self.top.walk(&self.groups, &packet.rays[i]);
+                    while let Some(group) = walk.next(best[i].t_high()) {
+                        group.closest_packet::<S>(&packet.rays[i..=i], 1, &mut best[i..=i]);
+                    }
+                }
+            }
         }
-        for (i, (hit, best)) in hits.iter_mut().zip(best).enumerate() {
-            *hit = if (active >> i) & 1 == 1 { best.hit(&packet[i]) } else { None };
+        for i in 0..packet.len {
+            hits[i] = best[i].hit(&packet.rays[i]);
         }
     }
 
-    /// [`World::is_blocked`] of up to [`PACKET`] rays at once: bit i is that of ray i. No allocation.
+    /// The bits of those of `rays` for which [`World::is_blocked`] answers true, the first ray's lowest.
     ///
     /// # Panics
-    /// When there are more rays than [`PACKET`].
+    /// When there are more than [`PACKET`] rays.
     #[inline(always)]
     pub fn blocked<S: Simd>(&self, rays: &[Ray]) -> u32 {
+        assert!(rays.len() <= PACKET, "at most {PACKET} rays");
+        let Some(packet) = Packet::new(rays) else { return 0 };
         let mut blocked = 0;
-        let Some((packet, active)) = packet(rays).filter(|_| self.groups.len() <= FLAT) else {
-            for (i, ray) in rays.iter().enumerate() {
-                blocked |= u32::from(self.is_blocked::<S>(ray)) << i;
+        if self.groups.len() <= FLAT {
+            for group in &self.groups {
+                let open = packet.active & !blocked;
+                if open == 0 {
+                    break;
+                }
+                blocked |= group.occluded_packet::<S>(packet.rays(), open);
             }
             return blocked;
-        };
-        let packet = &packet[..rays.len()];
-        for group in &self.groups {
-            let sinks = [GroupSink { layout: &group.layout, filter: Unfiltered }; PACKET];
-            let sinks = &sinks[..rays.len()];
-            let open = active & !blocked;
-            if open == 0 {
-                break;
+        }
+        for i in 0..packet.len {
+            if (packet.active >> i) & 1 == 1 {
+                let mut walk = self.top.walk(&self.groups, &packet.rays[i]);
+                let t_far = f64::from(packet.rays[i].range().t_far);
+                while let Some(group) = walk.next(t_far) {
+                    if group.occluded_packet::<S>(&packet.rays[i..=i], 1) != 0 {
+                        blocked |= 1 << i;
+                        break;
+                    }
+                }
             }
-            blocked |= group.accel.occluded_packet::<S, (), _>(&group.triangles(), packet, open, sinks, &mut ());
         }
         blocked
     }
 }
 
-/// The rays as structures want them and the bits of those that are rays; the others repeat one that is. `None` when none
-/// is.
-#[inline(always)]
-fn packet(rays: &[Ray]) -> Option<([TravRay; PACKET], u32)> {
-    assert!(rays.len() <= PACKET, "at most {PACKET} rays");
-    let stand_in = rays.iter().find_map(TravRay::new)?;
-    let (mut packet, mut active) = ([stand_in; PACKET], 0);
-    for (i, ray) in rays.iter().enumerate() {
-        if let Some(ray) = TravRay::new(ray) {
-            packet[i] = ray;
-            active |= 1 << i;
-        }
+impl GroupFrame {
+    #[inline(always)]
+    fn closest_packet<S: Simd>(&self, rays: &[TravRay], active: u32, best: &mut [Closest]) {
+        let sinks = [GroupSink { layout: &self.layout, filter: Unfiltered }; PACKET];
+        let prims = self.triangles();
+        self.accel.closest_packet::<S, (), _>(&prims, rays, active, best, &sinks[..rays.len()], &mut ());
     }
-    Some((packet, active))
+
+    #[inline(always)]
+    fn occluded_packet<S: Simd>(&self, rays: &[TravRay], active: u32) -> u32 {
+        let sinks = [GroupSink { layout: &self.layout, filter: Unfiltered }; PACKET];
+        let prims = self.triangles();
+        self.accel.occluded_packet::<S, (), _>(&prims, rays, active, &sinks[..rays.len()], &mut ())
+    }
 }

@@ -12,7 +12,7 @@ use super::{
 use crate::accel::{SpecError, TravRay};
 
 /// Up to this many groups are tested one by one and sorted by entry: a tree over so few costs more than it saves.
-const FLAT: usize = 8;
+pub(super) const FLAT: usize = 8;
 
 /// The structures over groups, by the names of `--top`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -62,6 +62,29 @@ impl Top {
         if kind == TopKind::Bvh2 && groups.len() > FLAT {
             self.tree.build(groups.iter().map(|g| g.bounds));
         }
+    }
+
+    /// All of at most [`FLAT`] groups, those that `ray` enters first before the others, those that it misses last.
+    ///
+    /// [`TopKind::List`] keeps them in their own order. What lies past the number of groups means nothing.
+    #[inline(always)]
+    pub(super) fn order(&self, groups: &[GroupFrame], ray: &TravRay) -> [usize; FLAT] {
+        let (mut order, mut entries) = ([0; FLAT], [0.0; FLAT]);
+        let slabs = SlabRay::new(ray);
+        let t_far = f64::from(ray.range().t_far);
+        for (number, group) in groups.iter().enumerate().take(FLAT) {
+            let mut at = number;
+            if self.kind == TopKind::Bvh2 && groups.len() > 1 {
+                let entry = slabs.entry(&group.bounds, t_far).unwrap_or(f64::INFINITY);
+                while at > 0 && entries[at - 1] > entry {
+                    (order[at], entries[at]) = (order[at - 1], entries[at - 1]);
+                    at -= 1;
+                }
+                entries[at] = entry;
+            }
+            order[at] = number;
+        }
+        order
     }
 
     /// Begins a walk over the groups that `ray` may hit.
