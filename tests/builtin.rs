@@ -51,7 +51,7 @@ fn sources_name_every_file_with_its_hash() {
     let sources = include_str!("../animations/SOURCES.md");
     for name in builtin::names() {
         let hash = Sha256::digest(builtin::bytes(name).expect("names are known"));
-        let hash: String = hash.iter().map(|byte| format!("{byte:02x}")).collect();
+        let hash = hash.iter().fold(String::new(), |text, byte| text + &format!("{byte:02x}"));
         let row = sources.lines().find(|line| line.contains(&format!("`{name}.glb`")));
         assert!(row.is_some_and(|row| row.contains(&hash)), "{name}: no row with {hash}");
     }

@@ -67,7 +67,7 @@ impl Task for Cast<'_> {
     #[inline(always)]
     fn run<S: Simd>(self) -> Vec<Answer> {
         // Odd triangles let rays pass.
-        let odd = |hit: &Hit| hit.prim.0 % 2 == 0;
+        let odd = |hit: &Hit| hit.prim.0.is_multiple_of(2);
         let answer = |ray: &Ray| {
             let (nearest, filtered) = (self.world.nearest_hit::<S>(ray), self.world.closest_hit::<S, _>(ray, &odd));
             (nearest, filtered, self.world.is_blocked::<S>(ray), self.world.is_occluded::<S, _>(ray, &odd))

@@ -95,7 +95,7 @@ impl Task for Together<'_> {
 fn packets_answer_as_single_rays_do() {
     let ray = |i: u16| {
         let (x, y) = (f32::from(i % 25) / 12.0 - 1.0, f32::from(i / 25) / 12.0 - 1.0);
-        let dir = if i % 11 == 0 { Vec3::NAN } else { Vec3::new(x * 0.5, y * 0.5, -1.0) };
+        let dir = if i.is_multiple_of(11) { Vec3::NAN } else { Vec3::new(x * 0.5, y * 0.5, -1.0) };
         Ray::new(Vec3::new(0.0, 0.3, 6.0), dir)
     };
     let rays: Vec<Ray> = (0..625).map(ray).collect();

@@ -107,8 +107,8 @@ impl<'a> Moment<'a> {
     }
 
     fn driven(&self, target: usize, path: Path) -> Option<Vec<f64>> {
-        let channels = self.playing.iter().flat_map(|&(a, t)| self.model.animations[a].iter().map(move |c| (c, t)));
-        channels.filter(|(c, _)| c.target == target && c.path == path).next_back().map(|(c, t)| sampled(c, t))
+        let mut channels = self.playing.iter().flat_map(|&(a, t)| self.model.animations[a].iter().map(move |c| (c, t)));
+        channels.rfind(|(c, _)| c.target == target && c.path == path).map(|(c, t)| sampled(c, t))
     }
 
     fn local(&self, node: usize) -> Matrix {

@@ -6,7 +6,7 @@ use kinora::scene::{Interpolation, LocalTransform, MeshPart, Scene, SceneNode};
 ///
 /// # Panics
 /// When one is broken.
-pub fn check(scene: &Scene) {
+pub(crate) fn check(scene: &Scene) {
     let nodes = scene.nodes.len();
     assert_eq!(scene.eval_order.len(), nodes);
     let mut seen = vec![false; nodes];

@@ -57,7 +57,7 @@ fn shading(scene: &Scene, note: &mut Note<'_>) {
     note(!any(|m| m.alpha_mode == AlphaMode::Blend), "blending", none("alpha mode BLEND"));
     note(!any(|m| m.normal_texture.is_some()), "normal maps and tangents", none("a normal texture"));
     note(!any(|m| m.occlusion_texture.is_some()), "occlusion maps", none("an occlusion texture"));
-    note(!any(|m| m.emissive != kinora::glam::Vec3::ZERO), "emission", none("an emissive factor"));
+    note(!any(|m| m.emissive != glam::Vec3::ZERO), "emission", none("an emissive factor"));
     note(!any(has_texture), "texture lookup and mipmaps", none("a texture"));
     let colors = scene.instances.iter().any(|&i| !scene.part(i).colors.is_empty());
     note(!colors, "vertex colours", "no drawn part has COLOR_0".to_owned());
