@@ -1,8 +1,8 @@
-//! From glTF bytes to a [`Scene`](super::Scene).
+//! From glTF bytes to a [`Scene`].
 //!
-//! The JSON text is read into plain structs ([`json`]), buffers are loaded, and each kind of object is
+//! The JSON text is read into plain structs (`json`), buffers are loaded, and each kind of object is
 //! converted by a module of its own. References, ranges and sizes are checked before anything is read or
-//! allocated; what a file may make the importer allocate is bounded by its size ([`context::Budget`]).
+//! allocated; what a file may make the importer allocate is bounded by its size (`context::Budget`).
 //! What would change the picture silently is an error; what can be worked around is a warning; an
 //! animation that is not valid disables itself.
 
