@@ -46,6 +46,7 @@ fn ids(prims: &Triangles<'_>) -> impl Iterator<Item = PrimId> + use<> {
 impl Accel for List {
     const NAME: &'static str = "list";
     type Config = ListConfig;
+    type RayState = ();
 
     fn build(prims: &Triangles<'_>, _config: &ListConfig) -> Result<Self, BuildError> {
         check_indices(Self::NAME, prims, u32::MAX as usize)?;

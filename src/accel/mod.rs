@@ -1,13 +1,16 @@
 //! Acceleration structures behind one trait, and the registry of their names.
 
 mod block;
+mod boxes;
 pub mod bvh2;
 pub mod list;
 mod packet;
 mod query;
 mod registry;
+mod run;
 mod sah;
 
+pub use boxes::Visitor;
 pub use packet::PACKET;
 pub use query::{AnyHit, Closest, HitSink, TravRay};
 pub use registry::{AccelKind, AccelSpec, AnyAccel, SpecError};
@@ -87,6 +90,20 @@ pub trait Counter {
     /// A block of up to four primitives was tested at once.
     #[inline(always)]
     fn block(&mut self) {}
+    /// A grid cell was entered.
+    #[inline(always)]
+    fn step(&mut self) {}
+    /// An event of a sorted list was handled.
+    #[inline(always)]
+    fn event(&mut self) {}
+    /// An event of a sorted list was passed over when its volume was opened.
+    #[inline(always)]
+    fn skip(&mut self) {}
+    /// Memory of the structure was read, triangles left out: `bytes` from `address` on.
+    #[inline(always)]
+    fn read(&mut self, address: usize, bytes: usize) {
+        let _ = (address, bytes);
+    }
 }
 
 impl Counter for () {}
@@ -111,6 +128,8 @@ pub trait Accel: Sized + Clone + Send + Sync + std::fmt::Debug + 'static {
     const NAME: &'static str;
     /// Build settings.
     type Config: AccelConfig;
+    /// What a walk leaves for rays that start where it ended; `()` where nothing is gained.
+    type RayState: Clone + Default + std::fmt::Debug;
 
     /// Builds over `prims`, in the current rayon pool.
     ///
@@ -131,6 +150,22 @@ pub trait Accel: Sized + Clone + Send + Sync + std::fmt::Debug + 'static {
         sink: &K,
         count: &mut C,
     );
+
+    /// As [`Accel::closest`]. `state` is what the walk of another ray left when it ended at this one's origin, or a default; the walk
+    /// leaves its own there. The answer does not depend on it.
+    #[inline(always)]
+    fn closest_from<S: Simd, C: Counter, K: HitSink>(
+        &self,
+        prims: &Triangles<'_>,
+        ray: &TravRay,
+        state: &mut Self::RayState,
+        best: &mut Closest,
+        sink: &K,
+        count: &mut C,
+    ) {
+        let _ = state;
+        self.closest::<S, C, K>(prims, ray, best, sink, count);
+    }
 
     /// True when any triangle that `sink` accepts is hit within the ray's range.
     fn occluded<S: Simd, C: Counter, K: HitSink>(

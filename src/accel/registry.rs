@@ -3,8 +3,10 @@
 use std::{fmt, str::FromStr};
 
 use super::{
-    Accel, AccelConfig, AccelStats, BuildError, Closest, Counter, HitSink, Refit, TravRay, Violation, bvh2::Bvh2,
+    Accel, AccelConfig, AccelStats, BuildError, Closest, Counter, HitSink, Refit, TravRay, Violation,
+    bvh2::Bvh2,
     list::List,
+    run::{ClosestPacketTask, ClosestTask, OccludedPacketTask, OccludedTask},
 };
 use crate::{
     geom::{Aabb, Triangles},
@@ -134,7 +136,7 @@ macro_rules! register_accels {
                 count: &mut C,
             ) {
                 match self {
-                    $(Self::$kind(a) => a.closest::<S, C, K>(prims, ray, best, sink, count),)*
+                    $(Self::$kind(accel) => S::call(ClosestTask { accel, prims, ray, best, sink, count }),)*
                 }
             }
 
@@ -148,7 +150,7 @@ macro_rules! register_accels {
                 count: &mut C,
             ) -> bool {
                 match self {
-                    $(Self::$kind(a) => a.occluded::<S, C, K>(prims, ray, sink, count),)*
+                    $(Self::$kind(accel) => S::call(OccludedTask { accel, prims, ray, sink, count }),)*
                 }
             }
 
@@ -164,7 +166,7 @@ macro_rules! register_accels {
                 count: &mut C,
             ) {
                 match self {
-                    $(Self::$kind(a) => a.closest_packet::<S, C, K>(prims, rays, active, best, sinks, count),)*
+                    $(Self::$kind(accel) => S::call(ClosestPacketTask { accel, prims, rays, active, best, sinks, count }),)*
                 }
             }
 
@@ -179,7 +181,7 @@ macro_rules! register_accels {
                 count: &mut C,
             ) -> u32 {
                 match self {
-                    $(Self::$kind(a) => a.occluded_packet::<S, C, K>(prims, rays, active, sinks, count),)*
+                    $(Self::$kind(accel) => S::call(OccludedPacketTask { accel, prims, rays, active, sinks, count }),)*
                 }
             }
 

@@ -39,3 +39,17 @@ fn run_avx2<T: Task>(task: T) -> T::Output {
 fn run_avx512<T: Task>(task: T) -> T::Output {
     task.run::<Avx512>()
 }
+
+#[cfg(target_arch = "x86_64")]
+#[inline(never)]
+#[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
+pub(super) fn call_avx2<T: Task>(task: T) -> T::Output {
+    task.run::<Avx2>()
+}
+
+#[cfg(target_arch = "x86_64")]
+#[inline(never)]
+#[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt,avx512f,avx512vl,avx512bw,avx512dq")]
+pub(super) fn call_avx512<T: Task>(task: T) -> T::Output {
+    task.run::<Avx512>()
+}

@@ -3,7 +3,7 @@ use std::{
     ops::{Add, Div, Mul, Neg, Sub},
 };
 
-use super::SimdLevel;
+use super::{SimdLevel, Task};
 
 /// The wide types of one level. Only this module implements it; the types of levels that a machine may lack are
 /// private, so code runs with them only below [`super::dispatch`].
@@ -21,6 +21,10 @@ pub trait Simd: Copy + Send + Sync + 'static {
 
     /// Four f32 as f64, exactly.
     fn widen(narrow: Self::F4) -> Self::D4;
+
+    /// Runs `task` in a function of its own, compiled for this level once for all callers: for work that is worth a
+    /// call but not a copy at every call site.
+    fn call<T: Task>(task: T) -> T::Output;
 }
 
 /// A vector of numbers. Bit i of a mask belongs to lane i.

@@ -3,7 +3,7 @@ use std::{
     ops::{Add, Div, Mul, Neg, Sub},
 };
 
-use super::{Halves, Lanes, Simd, SimdLevel};
+use super::{Halves, Lanes, Simd, SimdLevel, Task};
 
 /// Portable code.
 #[derive(Clone, Copy, Debug)]
@@ -19,6 +19,11 @@ impl Simd for Scalar {
     #[inline(always)]
     fn widen(narrow: Self::F4) -> Self::D4 {
         Array(narrow.0.map(f64::from))
+    }
+
+    #[inline(never)]
+    fn call<T: Task>(task: T) -> T::Output {
+        task.run::<Self>()
     }
 }
 

@@ -6,7 +6,10 @@
 use std::arch::x86_64::*;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
-use super::{Halves, Lanes, Simd, SimdLevel};
+use super::{
+    Halves, Lanes, Simd, SimdLevel, Task,
+    dispatch::{call_avx2, call_avx512},
+};
 
 /// AVX2 with FMA.
 #[derive(Clone, Copy, Debug)]
@@ -27,6 +30,12 @@ impl Simd for Avx2 {
     fn widen(narrow: F32x4) -> F64x4 {
         widen(narrow)
     }
+
+    #[inline(always)]
+    fn call<T: Task>(task: T) -> T::Output {
+        // SAFETY: the type is private to this module, so code names it only below a dispatch that found its features.
+        unsafe { call_avx2(task) }
+    }
 }
 
 impl Simd for Avx512 {
@@ -39,6 +48,12 @@ impl Simd for Avx512 {
     #[inline(always)]
     fn widen(narrow: F32x4) -> F64x4 {
         widen(narrow)
+    }
+
+    #[inline(always)]
+    fn call<T: Task>(task: T) -> T::Output {
+        // SAFETY: the type is private to this module, so code names it only below a dispatch that found its features.
+        unsafe { call_avx512(task) }
     }
 }
 

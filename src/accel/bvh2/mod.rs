@@ -120,6 +120,7 @@ impl Bvh2 {
 impl Accel for Bvh2 {
     const NAME: &'static str = "bvh2";
     type Config = Bvh2Config;
+    type RayState = ();
 
     fn build(prims: &Triangles<'_>, config: &Bvh2Config) -> Result<Self, BuildError> {
         check_indices(Self::NAME, prims, MAX_BLOCKS)?;

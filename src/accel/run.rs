@@ -1,0 +1,85 @@
+//! The queries as tasks, so that a structure's kernel is compiled once a level and sink, not at every place that asks.
+
+use super::{Accel, Closest, Counter, HitSink, TravRay};
+use crate::{
+    geom::Triangles,
+    simd::{Simd, Task},
+};
+
+/// [`Accel::closest`].
+pub(super) struct ClosestTask<'a, A, C, K> {
+    pub(super) accel: &'a A,
+    pub(super) prims: &'a Triangles<'a>,
+    pub(super) ray: &'a TravRay,
+    pub(super) best: &'a mut Closest,
+    pub(super) sink: &'a K,
+    pub(super) count: &'a mut C,
+}
+
+impl<A: Accel, C: Counter, K: HitSink> Task for ClosestTask<'_, A, C, K> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self) {
+        self.accel.closest::<S, C, K>(self.prims, self.ray, self.best, self.sink, self.count);
+    }
+}
+
+/// [`Accel::occluded`].
+pub(super) struct OccludedTask<'a, A, C, K> {
+    pub(super) accel: &'a A,
+    pub(super) prims: &'a Triangles<'a>,
+    pub(super) ray: &'a TravRay,
+    pub(super) sink: &'a K,
+    pub(super) count: &'a mut C,
+}
+
+impl<A: Accel, C: Counter, K: HitSink> Task for OccludedTask<'_, A, C, K> {
+    type Output = bool;
+
+    #[inline(always)]
+    fn run<S: Simd>(self) -> bool {
+        self.accel.occluded::<S, C, K>(self.prims, self.ray, self.sink, self.count)
+    }
+}
+
+/// [`Accel::closest_packet`].
+pub(super) struct ClosestPacketTask<'a, A, C, K> {
+    pub(super) accel: &'a A,
+    pub(super) prims: &'a Triangles<'a>,
+    pub(super) rays: &'a [TravRay],
+    pub(super) active: u32,
+    pub(super) best: &'a mut [Closest],
+    pub(super) sinks: &'a [K],
+    pub(super) count: &'a mut C,
+}
+
+impl<A: Accel, C: Counter, K: HitSink> Task for ClosestPacketTask<'_, A, C, K> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self) {
+        let Self { accel, prims, rays, active, best, sinks, count } = self;
+        accel.closest_packet::<S, C, K>(prims, rays, active, best, sinks, count);
+    }
+}
+
+/// [`Accel::occluded_packet`].
+pub(super) struct OccludedPacketTask<'a, A, C, K> {
+    pub(super) accel: &'a A,
+    pub(super) prims: &'a Triangles<'a>,
+    pub(super) rays: &'a [TravRay],
+    pub(super) active: u32,
+    pub(super) sinks: &'a [K],
+    pub(super) count: &'a mut C,
+}
+
+impl<A: Accel, C: Counter, K: HitSink> Task for OccludedPacketTask<'_, A, C, K> {
+    type Output = u32;
+
+    #[inline(always)]
+    fn run<S: Simd>(self) -> u32 {
+        let Self { accel, prims, rays, active, sinks, count } = self;
+        accel.occluded_packet::<S, C, K>(prims, rays, active, sinks, count)
+    }
+}
