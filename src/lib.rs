@@ -23,6 +23,7 @@ pub mod output;
 #[cfg(feature = "player")]
 pub mod player;
 pub mod render;
+pub mod report;
 pub mod scene;
 #[expect(unsafe_code, reason = "the only home of intrinsics and of the dispatch into them")]
 pub mod simd;

@@ -16,6 +16,7 @@ const MAY_IMPORT: &[(&str, &[&str])] = &[
     ("dynamics", &["world", "anim", "accel", "scene", "simd"]),
     ("render", &["world", "scene", "anim", "accel", "simd"]),
     ("output", &["render", "dynamics", "world", "anim", "scene", "simd"]),
+    ("report", &["output", "render", "dynamics", "world", "anim", "accel", "scene", "simd"]),
     ("player", &["output", "render", "dynamics", "world", "anim", "accel", "scene", "simd"]),
 ];
 
@@ -24,6 +25,7 @@ const ROOMS: &[(&str, &[&str])] = &[
     ("gltf::", &["scene/import"]),
     ("winit::", &["player"]),
     ("softbuffer::", &["player"]),
+    ("plotters::", &["report"]),
     ("clap::", &["cli", "main.rs"]),
     ("core::arch", &["simd"]),
     ("std::arch", &["simd"]),

@@ -1,0 +1,35 @@
+use crate::{accel::BuildError, output::OutputError, scene::import::ImportError};
+
+/// Why a report was not made.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ReportError {
+    /// The [`Monitor`](super::Monitor) asked for the end.
+    #[error("stopped before the report was complete")]
+    Stopped,
+    /// A scene could not be imported.
+    #[error(transparent)]
+    Import(#[from] ImportError),
+    /// A structure that everything is compared with could not be built.
+    #[error(transparent)]
+    Build(#[from] BuildError),
+    /// A file could not be written.
+    #[error(transparent)]
+    Output(#[from] OutputError),
+    /// An earlier report cannot be compared with.
+    #[error("{file}: {reason}")]
+    Baseline {
+        /// The file.
+        file: String,
+        /// What is wrong with it.
+        reason: String,
+    },
+    /// A plot could not be drawn.
+    #[error("plot {plot}: {reason}")]
+    Plot {
+        /// The plot's file name.
+        plot: String,
+        /// What the drawing code says.
+        reason: String,
+    },
+}

@@ -1,0 +1,26 @@
+//! Measurements with tables, plots, stated bounds and comparisons with earlier ones.
+//!
+//! A [`Report`] holds rows of [`Table`]s, [`Check`]s and [`Plot`]s; [`Report::write`] puts them into a folder as JSON, Markdown and SVG.
+//! [`structures`] measures every acceleration structure on scenes and on meshes of growing size; [`papers`] puts the tables of three
+//! papers beside ours.
+
+pub mod baseline;
+mod check;
+mod date;
+mod error;
+mod machine;
+mod markdown;
+mod monitor;
+pub mod papers;
+mod plot;
+mod record;
+pub mod structures;
+mod table;
+
+pub use check::{Bound, Check};
+pub use error::ReportError;
+pub use machine::Machine;
+pub use monitor::{Monitor, Quiet};
+pub use plot::{Bars, Chart, Line, Lines, Plot};
+pub use record::{Kind, Report, SCHEMA, Settings};
+pub use table::{Cell, Column, Role, Table};

@@ -1,0 +1,282 @@
+//! Plots as SVG, with the fonts of whoever shows them.
+
+use plotters::{
+    chart::{ChartBuilder, ChartContext},
+    coord::{
+        Shift,
+        combinators::{IntoLogRange, LogCoord},
+    },
+    prelude::*,
+    style::text_anchor::{HPos, Pos, VPos},
+};
+
+use super::ReportError;
+
+/// Size of a plot in pixels, and of its strips at the left, below and at the right.
+const SIZE: (u32, u32) = (900, 520);
+const LEFT: u32 = 64;
+const BELOW: u32 = 46;
+const LEGEND: i32 = 190;
+
+/// Colours that people with any colour vision tell apart, after Okabe and Ito; the last are added.
+const COLORS: [RGBColor; 10] = [
+    RGBColor(0, 114, 178),
+    RGBColor(213, 94, 0),
+    RGBColor(0, 158, 115),
+    RGBColor(204, 121, 167),
+    RGBColor(230, 159, 0),
+    RGBColor(86, 180, 233),
+    RGBColor(60, 60, 60),
+    RGBColor(140, 110, 70),
+    RGBColor(120, 80, 190),
+    RGBColor(150, 170, 40),
+];
+
+const FRAME: RGBColor = RGBColor(70, 70, 70);
+const GRID: RGBColor = RGBColor(222, 222, 222);
+
+/// Values of one name.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Line {
+    /// Its name in the legend.
+    pub name: String,
+    /// Points by ascending x; in [`Bars`] x is the number of a group.
+    pub points: Vec<(f64, f64)>,
+}
+
+/// Lines over two logarithmic axes.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Lines {
+    /// What runs to the right, with its unit.
+    pub x: String,
+    /// What runs upward, with its unit.
+    pub y: String,
+    /// The lines.
+    pub lines: Vec<Line>,
+}
+
+/// Values by group: a mark each, on a logarithmic axis.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Bars {
+    /// Names of the groups, from the left.
+    pub groups: Vec<String>,
+    /// What runs upward, with its unit.
+    pub y: String,
+    /// Marks of one colour.
+    pub lines: Vec<Line>,
+}
+
+/// What a plot shows.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Chart {
+    /// Growth over a number.
+    Lines(Lines),
+    /// Values side by side.
+    Bars(Bars),
+}
+
+/// A plot, drawn when it is asked for.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Plot {
+    /// File name without its extension; anything but letters, digits and `-` becomes `-`.
+    pub name: String,
+    /// Heading.
+    pub title: String,
+    /// What it shows.
+    pub chart: Chart,
+}
+
+type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
+type LogChart<'a, 'b, X> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<X, LogCoord<f64>>>;
+type Failed = DrawingAreaErrorKind<std::io::Error>;
+
+impl Plot {
+    /// A plot.
+    pub fn new(name: impl Into<String>, title: impl Into<String>, chart: Chart) -> Self {
+        Self { name: name.into(), title: title.into(), chart }
+    }
+
+    /// Name of its file.
+    pub fn file(&self) -> String {
+        let plain = |c: char| if c.is_ascii_alphanumeric() { c } else { '-' };
+        format!("{}.svg", self.name.chars().map(plain).collect::<String>())
+    }
+
+    /// The plot as SVG. Points that are not positive and finite are left out.
+    ///
+    /// # Errors
+    /// What the drawing code refuses.
+    pub fn svg(&self) -> Result<String, ReportError> {
+        let mut svg = String::new();
+        let drawn = {
+            let root = SVGBackend::with_string(&mut svg, SIZE).into_drawing_area();
+            match &self.chart {
+                Chart::Lines(lines) => draw_lines(&root, &self.title, lines),
+                Chart::Bars(bars) => draw_bars(&root, &self.title, bars),
+            }
+            .and_then(|()| root.present())
+        };
+        drawn.map_err(|e| ReportError::Plot { plot: self.file(), reason: e.to_string() })?;
+        Ok(svg)
+    }
+}
+
+fn draw_lines(root: &Area<'_>, title: &str, lines: &Lines) -> Result<(), Failed> {
+    let [x, y] = [decades(&lines.lines, |p| p.0), decades(&lines.lines, |p| p.1)];
+    let plot = begin(root, title, &lines.lines)?;
+    let mut chart = ChartBuilder::on(&plot)
+        .margin(8)
+        .x_label_area_size(BELOW)
+        .y_label_area_size(LEFT)
+        .build_cartesian_2d((x.0..x.1).log_scale(), (y.0..y.1).log_scale())?;
+    chart
+        .configure_mesh()
+        .x_desc(&lines.x)
+        .y_desc(&lines.y)
+        .x_label_formatter(&|x| short(*x))
+        .y_label_formatter(&|y| short(*y))
+        .bold_line_style(GRID)
+        .light_line_style(TRANSPARENT)
+        .axis_style(FRAME)
+        .label_style(("sans-serif", 13))
+        .draw()?;
+    for (i, line) in lines.lines.iter().enumerate() {
+        let points = line.points.iter().copied().filter(|p| drawable(p.0) && drawable(p.1)).collect::<Vec<_>>();
+        chart.draw_series(LineSeries::new(points.iter().copied(), color(i).stroke_width(2)))?;
+        mark(&plot, &chart, i, &points)?;
+    }
+    Ok(())
+}
+
+fn draw_bars(root: &Area<'_>, title: &str, bars: &Bars) -> Result<(), Failed> {
+    let y = decades(&bars.lines, |p| p.1);
+    let plot = begin(root, title, &bars.lines)?;
+    let mut chart = ChartBuilder::on(&plot)
+        .margin(8)
+        .x_label_area_size(BELOW)
+        .y_label_area_size(LEFT)
+        .build_cartesian_2d(0.0..bars.groups.len().max(1) as f64, (y.0..y.1).log_scale())?;
+    chart
+        .configure_mesh()
+        .disable_x_mesh()
+        .x_labels(0)
+        .y_desc(&bars.y)
+        .y_label_formatter(&|y| short(*y))
+        .bold_line_style(GRID)
+        .light_line_style(TRANSPARENT)
+        .axis_style(FRAME)
+        .label_style(("sans-serif", 13))
+        .draw()?;
+    for (i, group) in bars.groups.iter().enumerate() {
+        let (px, py) = chart.backend_coord(&(i as f64 + 0.5, y.0));
+        let origin = plot.get_base_pixel();
+        let style = ("sans-serif", 12).into_font().color(&FRAME).pos(Pos::new(HPos::Center, VPos::Top));
+        // Neighbours stand at two heights, so that long names do not meet.
+        let step = if bars.groups.len() > 6 && i % 2 == 1 { 16 } else { 0 };
+        plot.draw(&Text::new(group.clone(), (px - origin.0, py - origin.1 + 8 + step), style))?;
+    }
+    for (i, line) in bars.lines.iter().enumerate() {
+        let points = line.points.iter().filter(|p| drawable(p.1));
+        // Marks of a group stand side by side.
+        let shift = (i as f64 + 0.5) / bars.lines.len() as f64 * 0.6 + 0.2;
+        mark(&plot, &chart, i, &points.map(|p| (p.0 + shift, p.1)).collect::<Vec<_>>())?;
+    }
+    Ok(())
+}
+
+/// Fills the ground, writes the title and the legend; the area left for the axes.
+fn begin<'a>(root: &Area<'a>, title: &str, lines: &[Line]) -> Result<Area<'a>, Failed> {
+    root.fill(&WHITE)?;
+    let below = root.titled(title, ("sans-serif", 18))?;
+    #[expect(clippy::cast_possible_wrap, reason = "a picture's width")]
+    let (plot, legend) = below.split_horizontally(SIZE.0 as i32 - LEGEND);
+    let mut y = 16;
+    for (i, line) in lines.iter().enumerate() {
+        draw_mark(&legend, i, (12, y))?;
+        let style = ("sans-serif", 13).into_font().color(&FRAME).pos(Pos::new(HPos::Left, VPos::Center));
+        legend.draw(&Text::new(line.name.clone(), (24, y), style))?;
+        y += 20;
+    }
+    Ok(plot)
+}
+
+/// Marks points given in the chart's coordinates.
+fn mark<X: Ranged<ValueType = f64>>(
+    plot: &Area<'_>,
+    chart: &LogChart<'_, '_, X>,
+    line: usize,
+    points: &[(f64, f64)],
+) -> Result<(), Failed> {
+    let origin = plot.get_base_pixel();
+    points.iter().try_for_each(|point| {
+        let (x, y) = chart.backend_coord(point);
+        draw_mark(plot, line, (x - origin.0, y - origin.1))
+    })
+}
+
+/// The mark of a line: its colour, and a form that changes when colours begin anew.
+fn draw_mark(area: &Area<'_>, line: usize, at: (i32, i32)) -> Result<(), Failed> {
+    match line / COLORS.len() % 3 {
+        0 => area.draw(&Circle::new(at, 4, color(line).filled())),
+        1 => area.draw(&TriangleMarker::new(at, 6, color(line).filled())),
+        _ => area.draw(&Cross::new(at, 4, color(line).stroke_width(2))),
+    }
+}
+
+fn color(line: usize) -> RGBColor {
+    COLORS[line % COLORS.len()]
+}
+
+fn drawable(x: f64) -> bool {
+    x.is_finite() && x > 0.0
+}
+
+/// The whole decades that hold all values.
+fn decades(lines: &[Line], value: impl Fn(&(f64, f64)) -> f64) -> (f64, f64) {
+    let values = lines.iter().flat_map(|l| &l.points).map(value).filter(|&v| drawable(v));
+    let (low, high) = values.fold((f64::INFINITY, 0.0_f64), |(low, high), v| (low.min(v), high.max(v)));
+    if low > high {
+        return (1.0, 10.0);
+    }
+    let (first, last) = (libm::floor(libm::log10(low)), libm::ceil(libm::log10(high)));
+    (libm::pow(10.0, first), libm::pow(10.0, last.max(first + 1.0)))
+}
+
+/// A number in few characters.
+fn short(x: f64) -> String {
+    for (unit, name) in [(1e9, "G"), (1e6, "M"), (1e3, "k")] {
+        if x >= unit * 0.9999 {
+            return format!("{}{name}", trimmed(x / unit));
+        }
+    }
+    trimmed(x)
+}
+
+fn trimmed(x: f64) -> String {
+    let text = format!("{x:.6}");
+    text.trim_end_matches('0').trim_end_matches('.').to_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn axes_take_whole_decades() {
+        let line = |points: &[(f64, f64)]| vec![Line { name: "a".into(), points: points.to_vec() }];
+        assert_eq!(decades(&line(&[(1.0, 3.0), (2.0, 450.0)]), |p| p.1), (1.0, 1000.0));
+        assert_eq!(decades(&line(&[(1.0, 0.0), (2.0, f64::NAN)]), |p| p.1), (1.0, 10.0));
+        assert_eq!(decades(&line(&[(1.0, 100.0)]), |p| p.1), (100.0, 1000.0));
+    }
+
+    #[test]
+    fn labels_are_short() {
+        assert_eq!(["1k", "10M", "0.01", "5"], [1e3, 1e7, 0.01, 5.0].map(short).each_ref().map(String::as_str));
+    }
+
+    #[test]
+    fn file_names_hold_letters_digits_and_dashes() {
+        let chart = Chart::Bars(Bars { groups: vec![], y: "y".into(), lines: vec![] });
+        assert_eq!(Plot::new("rates builtin:walk/x", "t", chart).file(), "rates-builtin-walk-x.svg");
+    }
+}

@@ -1,0 +1,1 @@
+//! Every acceleration structure on scenes and on meshes of growing size.
