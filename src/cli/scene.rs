@@ -11,7 +11,8 @@ use kinora::{
 use super::{error::CliError, settings::Settings};
 
 /// Help text of every SCENE argument.
-pub(crate) const SCENE_HELP: &str = "A .gltf or .glb file, or builtin:NAME [default: the first built-in scene]";
+pub(crate) const SCENE_HELP: &str =
+    "A .gltf or .glb file, or builtin:NAME (builtin:spd-NAME:SIZE) [default: the first built-in scene]";
 
 /// Help text of every `--animation` option.
 pub(crate) const ANIMATION_HELP: &str = "Index or name of an animation, `all` together, or `none` for the rest pose";

@@ -14,6 +14,7 @@ mod material;
 mod mesh;
 mod node;
 mod skin;
+pub mod spd;
 mod texture;
 
 pub use camera::{Camera, Projection};

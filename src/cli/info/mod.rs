@@ -43,9 +43,10 @@ pub(crate) fn run(args: &InfoArgs, settings: &Settings) -> Result<(), CliError> 
 }
 
 fn list_builtin(as_json: bool) -> Result<(), CliError> {
+    let names: Vec<_> = builtin::names().iter().chain(builtin::generated_names()).copied().collect();
     if as_json {
-        return stdout::write_json(&json!({ "builtin": builtin::names() }));
+        return stdout::write_json(&json!({ "builtin": names }));
     }
-    let lines: String = builtin::names().iter().flat_map(|name| [*name, "\n"]).collect();
+    let lines: String = names.into_iter().flat_map(|name| [name, "\n"]).collect();
     stdout::write(lines.as_bytes())
 }
