@@ -3,12 +3,15 @@
 mod block;
 mod boxes;
 pub mod bvh2;
+pub mod kdtree;
+mod leaves;
 pub mod list;
 mod packet;
 mod query;
 mod registry;
 mod run;
 mod sah;
+mod shapes;
 
 pub use boxes::Visitor;
 pub use packet::PACKET;

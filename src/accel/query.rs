@@ -224,7 +224,7 @@ fn rounded(hit: &TriangleHit, ray: &TravRay, instance: InstanceId, prim: PrimId)
 /// The least f32 that is not below `t`; `t` must not exceed the range of f32 by more than a rounding.
 #[inline(always)]
 #[expect(clippy::cast_possible_truncation, reason = "the rounding is what is asked for")]
-fn round_up(t: f64) -> f32 {
+pub(super) fn round_up(t: f64) -> f32 {
     let near = t as f32;
     if f64::from(near) < t { near.next_up() } else { near }
 }

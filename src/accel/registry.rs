@@ -5,6 +5,7 @@ use std::{fmt, str::FromStr};
 use super::{
     Accel, AccelConfig, AccelStats, BuildError, Closest, Counter, HitSink, Refit, TravRay, Violation,
     bvh2::Bvh2,
+    kdtree::KdTree,
     list::List,
     run::{ClosestPacketTask, ClosestTask, OccludedPacketTask, OccludedTask},
 };
@@ -225,6 +226,8 @@ register_accels! {
     List => List,
     /// Binary hierarchy of boxes.
     Bvh2 => Bvh2,
+    /// Kd-tree.
+    Kdtree => KdTree,
 }
 
 impl AccelKind {
