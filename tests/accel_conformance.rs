@@ -503,12 +503,12 @@ fn an_index_out_of_range_is_an_error() {
 fn specifications_name_what_exists() {
     let parse = |text: &str| text.parse::<AccelSpec>().map(|s| s.to_string()).map_err(|e| e.to_string());
     assert_eq!(parse("bvh2"), Ok("bvh2".into()));
-    assert_eq!(parse("bvh2:bins=32,leaf_blocks=1"), Ok("bvh2:bins=32,leaf_blocks=1".into()));
+    assert_eq!(parse("bvh2:bins=32,leaf=1"), Ok("bvh2:bins=32,leaf=1".into()));
     let names = AccelKind::names();
     assert!(names.starts_with("list, bvh2"), "{names}");
     assert_eq!(parse("octree"), Err(format!("unknown structure `octree`; there are: {names}")));
     let unknown = parse("bvh2:depth=3").unwrap_err();
-    assert!(unknown.starts_with("bvh2: setting `depth`: unknown; there are: bins, leaf_blocks"), "{unknown}");
+    assert!(unknown.starts_with("bvh2: setting `depth`: unknown; there are: build, bins, leaf"), "{unknown}");
     assert_eq!(parse("bvh2:bins=1"), Err("bvh2: setting `bins`: `1` is not a number from 2 to 64".into()));
     assert_eq!(parse("bvh2:bins"), Err("bvh2: `bins` is not of the form key=value".into()));
     assert_eq!(parse("list:a=b"), Err("list: setting `a`: unknown; there are no settings".into()));
@@ -520,11 +520,11 @@ fn settings_change_the_tree_but_no_answer() {
     let rays = rays_at(&mesh, 300, 78);
     let reference = build(AccelKind::Bvh2, &mesh);
     let due: Vec<_> = closest(&reference, &mesh.prims(), &rays, SimdLevel::best()).into_iter().map(bits).collect();
-    for text in ["bvh2:bins=2", "bvh2:bins=64,leaf_blocks=1", "bvh2:leaf_blocks=2"] {
+    for text in ["bvh2:bins=2", "bvh2:bins=64,leaf=1", "bvh2:leaf=8", "bvh2:build=median,leaf=1", "bvh2:build=median"] {
         let spec: AccelSpec = text.parse().expect("known settings");
         let accel = spec.build(&mesh.prims()).expect("the mesh builds");
         accel.validate(&mesh.prims()).expect("valid");
-        if text != "bvh2:leaf_blocks=2" {
+        if text != "bvh2:leaf=8" {
             assert_ne!(accel.stats(), reference.stats(), "{text}");
         }
         let hits: Vec<_> = closest(&accel, &mesh.prims(), &rays, SimdLevel::best()).into_iter().map(bits).collect();

@@ -6,7 +6,7 @@
 
 use glam::{Mat4, Vec3, Vec3A, Vec4};
 
-use super::{Closest, Counter, HitSink, TravRay, query::blocks};
+use super::{Closest, Counter, HitSink, TravRay, query::blocks, sah::BLOCK};
 use crate::{
     geom::{
         Aabb, PrimId, Triangles,
@@ -42,6 +42,20 @@ impl TriBlock {
     /// A block of up to four triangles whose corners are still to be set by [`TriBlock::refit`].
     pub(super) fn new(prims: [u32; 4]) -> Self {
         Self { corners: [[[0.0; 4]; 3]; 3], prims }
+    }
+
+    /// Blocks that many triangles take.
+    pub(super) fn count_for(triangles: usize) -> usize {
+        triangles.div_ceil(BLOCK)
+    }
+
+    /// The blocks of these triangles, in order; the last may be short.
+    pub(super) fn of(prims: &[u32]) -> impl Iterator<Item = Self> + '_ {
+        prims.chunks(BLOCK).map(|chunk| {
+            let mut lanes = [NO_PRIM; BLOCK];
+            lanes[..chunk.len()].copy_from_slice(chunk);
+            Self::new(lanes)
+        })
     }
 
     /// Triangles of the block, in lane order.

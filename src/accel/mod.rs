@@ -12,11 +12,14 @@ mod registry;
 mod run;
 mod sah;
 mod shapes;
+pub mod ssh;
+mod topology;
 
 pub use boxes::Visitor;
 pub use packet::PACKET;
 pub use query::{AnyHit, Closest, HitSink, TravRay};
 pub use registry::{AccelKind, AccelSpec, AnyAccel, SpecError};
+pub use topology::Cut;
 
 use crate::{
     geom::{Aabb, Triangles},

@@ -8,6 +8,7 @@ use super::{
     kdtree::KdTree,
     list::List,
     run::{ClosestPacketTask, ClosestTask, OccludedPacketTask, OccludedTask},
+    ssh::Ssh,
 };
 use crate::{
     geom::{Aabb, Triangles},
@@ -228,6 +229,8 @@ register_accels! {
     Bvh2 => Bvh2,
     /// Kd-tree.
     Kdtree => KdTree,
+    /// Single slab hierarchy.
+    Ssh => Ssh,
 }
 
 impl AccelKind {

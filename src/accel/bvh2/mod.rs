@@ -17,18 +17,17 @@ mod validate;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::{
-    Accel, AccelConfig, AccelStats, BuildError, Closest, Counter, HitSink, Refit, TravRay, Violation, block::TriBlock,
+    Accel, AccelConfig, AccelStats, BuildError, Closest, Counter, HitSink, Refit, TravRay, Violation,
+    block::TriBlock,
     check_indices, sah,
+    topology::{self, Cut, MAX_DEPTH, MAX_LEAF},
 };
 use crate::{
     geom::{Aabb, Triangles},
     simd::Simd,
 };
-use node::{MAX_BLOCKS, MAX_LEAF_BLOCKS, Pair};
+use node::{MAX_BLOCKS, Pair};
 use refit::Swept;
-
-/// Most pairs on a path from the root, which the builder keeps to: the length of traversal stacks.
-const MAX_DEPTH: usize = 64;
 
 /// Tells topologies apart: structures with equal numbers differ in boxes and corners only.
 static NEXT_TOPOLOGY: AtomicU64 = AtomicU64::new(0);
@@ -66,28 +65,29 @@ impl Clone for Bvh2 {
 /// Build settings of `bvh2`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Bvh2Config {
+    /// How nodes are cut.
+    pub build: Cut,
     /// Bins an axis, 2 to 64.
     pub bins: usize,
-    /// Most blocks of four triangles in a leaf, 1 to 8.
-    pub leaf_blocks: usize,
+    /// Most triangles in a leaf, 1 to 32; leaves take whole blocks of four.
+    pub leaf: usize,
 }
 
 impl Default for Bvh2Config {
     fn default() -> Self {
-        Self { bins: 16, leaf_blocks: MAX_LEAF_BLOCKS }
+        Self { build: Cut::Sah, bins: 16, leaf: MAX_LEAF }
     }
 }
 
 impl AccelConfig for Bvh2Config {
-    const KEYS: &'static [&'static str] = &["bins", "leaf_blocks"];
+    const KEYS: &'static [&'static str] = &["build", "bins", "leaf"];
 
     fn set(&mut self, key: &str, value: &str) -> Result<(), String> {
-        let (slot, range) = match key {
-            "bins" => (&mut self.bins, 2..=build::MAX_BINS),
-            _ => (&mut self.leaf_blocks, 1..=MAX_LEAF_BLOCKS),
-        };
-        let number = value.parse().ok().filter(|n| range.contains(n));
-        *slot = number.ok_or_else(|| format!("`{value}` is not a number from {} to {}", range.start(), range.end()))?;
+        match key {
+            "build" => self.build = topology::parse_cut(value)?,
+            "bins" => self.bins = topology::parse_bins(value)?,
+            _ => self.leaf = topology::parse_leaf(value)?,
+        }
         Ok(())
     }
 }
@@ -124,7 +124,8 @@ impl Accel for Bvh2 {
 
     fn build(prims: &Triangles<'_>, config: &Bvh2Config) -> Result<Self, BuildError> {
         check_indices(Self::NAME, prims, MAX_BLOCKS)?;
-        let emitted = build::build(prims, config);
+        let settings = topology::Settings { cut: config.build, bins: config.bins, leaf: config.leaf };
+        let emitted = build::build(prims, &settings);
         let mut out = Self {
             pairs: emitted.pairs,
             blocks: emitted.blocks,

@@ -4,10 +4,13 @@ use std::ops::Range;
 
 use glam::Vec3;
 
-use crate::geom::Aabb;
+use crate::{
+    accel::{sah::BLOCK, topology::MAX_LEAF},
+    geom::Aabb,
+};
 
 /// Blocks that one leaf may hold.
-pub(super) const MAX_LEAF_BLOCKS: usize = 8;
+const MAX_LEAF_BLOCKS: usize = MAX_LEAF.div_ceil(BLOCK);
 
 /// Most blocks a tree may hold: a leaf link has 28 bits for the first, and the last number marks an empty child.
 pub(super) const MAX_BLOCKS: usize = (1 << 28) - 2;
@@ -63,15 +66,6 @@ impl Link {
     #[inline(always)]
     pub(super) fn map_bits(self, identity: impl Fn(u32) -> u32) -> Self {
         Self(identity(self.0))
-    }
-
-    /// The link when what it names moves by that many pairs or blocks.
-    pub(super) fn moved(self, pairs: usize, blocks: usize) -> Self {
-        match self {
-            Self::NONE => self,
-            Self(bits) if self.is_leaf() => Self(bits + blocks as u32),
-            Self(bits) => Self(bits + pairs as u32),
-        }
     }
 }
 

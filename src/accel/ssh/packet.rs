@@ -1,0 +1,292 @@
+use arrayvec::ArrayVec;
+
+use super::{
+    Ssh,
+    node::{Node, Side, Word},
+    traverse::SLACK,
+};
+use crate::{
+    accel::{
+        Accel, Closest, Counter, HitSink, TravRay,
+        packet::{PACKET, PacketRays, bits},
+        query::{GROW, SHRINK},
+        topology::MAX_DEPTH,
+    },
+    geom::{Aabb, Triangles},
+    simd::{Lanes, Simd},
+};
+
+/// Groups of fewer rays of common direction signs are walked one by one.
+const FEW: u32 = 3;
+
+/// Rays of common direction signs, one to a lane, against single planes. The proof at `FastSlabs` holds lane by lane; lanes of
+/// rays with other signs hold nonsense and are masked.
+struct PacketSlabs<S: Simd> {
+    origin: [S::F; 3],
+    /// By [`Side::row`]: factors for entries and exits, NaN for those that are not.
+    entry: [S::F; Side::ROWS],
+    exit: [S::F; Side::ROWS],
+    backward: [bool; 3],
+    t_near: S::F,
+    limit: S::F,
+}
+
+/// The part of each ray inside a node.
+#[derive(Clone, Copy)]
+struct Segments<S: Simd> {
+    near: S::F,
+    far: S::F,
+}
+
+impl<S: Simd> Segments<S> {
+    #[inline(always)]
+    fn open(self) -> u32 {
+        (self.near - self.far).le(S::F::splat(SLACK))
+    }
+}
+
+impl<S: Simd> PacketSlabs<S> {
+    #[inline(always)]
+    fn new(packet: &PacketRays, backward: [bool; 3]) -> Self {
+        let nan = S::F::splat(f32::NAN);
+        let row = |rows: &[[f32; PACKET]; 3], axis: usize| S::F::load(&rows[axis]);
+        let origin = [row(&packet.origin32, 0), row(&packet.origin32, 1), row(&packet.origin32, 2)];
+        let mut out = Self {
+            origin,
+            entry: [nan; Side::ROWS],
+            exit: [nan; Side::ROWS],
+            backward,
+            t_near: S::F::load(&packet.t_near32),
+            limit: S::F::load(&packet.t_cull),
+        };
+        for side in Side::ALL {
+            // As `TravRay::new`.
+            let inv = S::F::splat(1.0) / row(&packet.dir32, side.axis());
+            if side.is_upper() == backward[side.axis()] {
+                out.entry[side.row()] = inv * S::F::splat(SHRINK);
+            } else {
+                out.exit[side.row()] = inv * S::F::splat(GROW);
+            }
+        }
+        out
+    }
+
+    #[inline(always)]
+    fn cut(&self, plane: f32, side: Side, segments: Segments<S>) -> Segments<S> {
+        let distance = S::F::splat(plane) - self.origin[side.axis()];
+        Segments {
+            near: (distance * self.entry[side.row()]).max(segments.near),
+            far: (distance * self.exit[side.row()]).min(segments.far),
+        }
+    }
+
+    #[inline(always)]
+    fn cut_by(&self, node: &Node, segments: Segments<S>) -> Segments<S> {
+        self.cut(node.plane, node.word.side(), segments)
+    }
+
+    #[inline(always)]
+    fn clipped(&self, bounds: &Aabb) -> Segments<S> {
+        let mut segments = Segments { near: self.t_near, far: self.limit };
+        for side in Side::ALL {
+            segments = self.cut(side.of(bounds), side, segments);
+        }
+        segments
+    }
+}
+
+/// A node to visit: which rays meet it, and their parts inside.
+#[derive(Clone, Copy)]
+struct Entry<S: Simd> {
+    word: Word,
+    mask: u32,
+    segments: Segments<S>,
+}
+
+/// Nodes to visit; at most one a level, and the builder bounds the depth.
+type Stack<S> = ArrayVec<Entry<S>, MAX_DEPTH>;
+
+/// The first of the rays in `left` and all others of the same direction signs; rays that are not ordinary stand alone.
+#[inline(always)]
+fn group(ssh: &Ssh, rays: &[TravRay], left: u32) -> (u32, [bool; 3]) {
+    let signs = |ray: &TravRay| ray.range().dir.to_array().map(|d| d < 0.0);
+    let leader = left.trailing_zeros() as usize;
+    let due = signs(&rays[leader]);
+    if !ssh.is_ordinary(&rays[leader]) {
+        return (1 << leader, due);
+    }
+    let mut members = 0;
+    for i in bits(left) {
+        members |= u32::from(ssh.is_ordinary(&rays[i]) && signs(&rays[i]) == due) << i;
+    }
+    (members, due)
+}
+
+impl Ssh {
+    #[inline(always)]
+    pub(super) fn walk_closest_packet<S: Simd, C: Counter, K: HitSink>(
+        &self,
+        prims: &Triangles<'_>,
+        rays: &[TravRay],
+        active: u32,
+        best: &mut [Closest],
+        sinks: &[K],
+        count: &mut C,
+    ) {
+        for start in (0..rays.len()).step_by(S::F::LEN) {
+            let end = rays.len().min(start + S::F::LEN);
+            let (rays, best, sinks) = (&rays[start..end], &mut best[start..end], &sinks[start..end]);
+            let mut left = (active >> start) & ((1 << rays.len()) - 1);
+            while left != 0 {
+                let (members, backward) = group(self, rays, left);
+                left &= !members;
+                if members.count_ones() >= FEW {
+                    self.closest_together::<S, C, K>(rays, members, backward, best, sinks, count);
+                } else {
+                    for i in bits(members) {
+                        self.closest::<S, C, K>(prims, &rays[i], &mut best[i], &sinks[i], count);
+                    }
+                }
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn closest_together<S: Simd, C: Counter, K: HitSink>(
+        &self,
+        rays: &[TravRay],
+        active: u32,
+        backward: [bool; 3],
+        best: &mut [Closest],
+        sinks: &[K],
+        count: &mut C,
+    ) {
+        let mut packet = PacketRays::new(rays);
+        for (i, best) in best.iter().enumerate() {
+            packet.set_limit(i, best);
+        }
+        let mut slabs = PacketSlabs::<S>::new(&packet, backward);
+        let segments = slabs.clipped(&self.bounds);
+        let mut entry = Entry { word: self.root, mask: active & segments.open(), segments };
+        if entry.mask == 0 {
+            return;
+        }
+        let mut stack = Stack::<S>::new();
+        loop {
+            if entry.word.is_leaf() {
+                for block in self.leaf_blocks(entry.word, count) {
+                    block.closest_packet::<S, C, K>(rays, &mut packet, entry.mask, best, sinks, count);
+                }
+                slabs.limit = S::F::load(&packet.t_cull);
+            } else if let Some(next) = self.descend_together(&slabs, &mut stack, &entry, count) {
+                entry = next;
+                continue;
+            }
+            entry = loop {
+                let Some(mut entry) = stack.pop() else { return };
+                entry.segments.far = slabs.limit.min(entry.segments.far);
+                entry.mask &= entry.segments.open();
+                if entry.mask != 0 {
+                    break entry;
+                }
+            };
+        }
+    }
+
+    /// The active rays that something blocks.
+    #[inline(always)]
+    pub(super) fn walk_occluded_packet<S: Simd, C: Counter, K: HitSink>(
+        &self,
+        prims: &Triangles<'_>,
+        rays: &[TravRay],
+        active: u32,
+        sinks: &[K],
+        count: &mut C,
+    ) -> u32 {
+        let mut blocked = 0;
+        for start in (0..rays.len()).step_by(S::F::LEN) {
+            let end = rays.len().min(start + S::F::LEN);
+            let (rays, sinks) = (&rays[start..end], &sinks[start..end]);
+            let mut left = (active >> start) & ((1 << rays.len()) - 1);
+            while left != 0 {
+                let (members, backward) = group(self, rays, left);
+                left &= !members;
+                if members.count_ones() >= FEW {
+                    blocked |= self.occluded_together::<S, C, K>(rays, members, backward, sinks, count) << start;
+                } else {
+                    for i in bits(members) {
+                        let hit = self.occluded::<S, C, K>(prims, &rays[i], &sinks[i], count);
+                        blocked |= u32::from(hit) << (start + i);
+                    }
+                }
+            }
+        }
+        blocked
+    }
+
+    #[inline(always)]
+    fn occluded_together<S: Simd, C: Counter, K: HitSink>(
+        &self,
+        rays: &[TravRay],
+        active: u32,
+        backward: [bool; 3],
+        sinks: &[K],
+        count: &mut C,
+    ) -> u32 {
+        let packet = PacketRays::new(rays);
+        let slabs = PacketSlabs::<S>::new(&packet, backward);
+        let segments = slabs.clipped(&self.bounds);
+        let mut entry = Entry { word: self.root, mask: active & segments.open(), segments };
+        if entry.mask == 0 {
+            return 0;
+        }
+        let mut stack = Stack::<S>::new();
+        let mut open = active;
+        loop {
+            if entry.word.is_leaf() {
+                for block in self.leaf_blocks(entry.word, count) {
+                    open &= !block.occluded_packet::<S, C, K>(rays, &packet, entry.mask & open, sinks, count);
+                }
+                if open == 0 {
+                    return active;
+                }
+            } else if let Some(next) = self.descend_together(&slabs, &mut stack, &entry, count) {
+                entry = next;
+                continue;
+            }
+            entry = loop {
+                let Some(mut entry) = stack.pop() else { return active & !open };
+                entry.mask &= open;
+                if entry.mask != 0 {
+                    break entry;
+                }
+            };
+        }
+    }
+
+    /// Cuts the segments with both children; the one that comes first along the order axis is next, the other goes to the stack.
+    #[inline(always)]
+    fn descend_together<S: Simd, C: Counter>(
+        &self,
+        slabs: &PacketSlabs<S>,
+        stack: &mut Stack<S>,
+        entry: &Entry<S>,
+        count: &mut C,
+    ) -> Option<Entry<S>> {
+        count.node();
+        count.node();
+        let nodes = &self.pairs[entry.word.index()].0;
+        let segments = [slabs.cut_by(&nodes[0], entry.segments), slabs.cut_by(&nodes[1], entry.segments)];
+        let masks = [segments[0].open() & entry.mask, segments[1].open() & entry.mask];
+        let child = |i: usize| Entry { word: nodes[i].word, mask: masks[i], segments: segments[i] };
+        if masks[0] == 0 {
+            return (masks[1] != 0).then(|| child(1));
+        }
+        if masks[1] == 0 {
+            return Some(child(0));
+        }
+        let first = usize::from(slabs.backward[entry.word.order()]);
+        stack.push(child(1 - first));
+        Some(child(first))
+    }
+}
