@@ -2,7 +2,7 @@
 
 use std::cmp::Ordering;
 
-use glam::Vec3;
+use glam::{Vec3, Vec3A};
 
 use crate::geom::{
     Hit, InstanceId, PrimId, Ray, Triangles,
@@ -81,7 +81,7 @@ impl TravRay {
         }
         Some(Self {
             range: RayRange { origin: ray.origin, dir, t_near: t_near.max(0.0) + 0.0, t_far: t_far + 0.0 },
-            inv: Vec3::ONE / dir,
+            inv: reciprocal(dir),
             ordinary,
         })
     }
@@ -103,6 +103,13 @@ impl TravRay {
     pub fn is_ordinary(&self) -> bool {
         self.ordinary
     }
+}
+
+/// As one vector: compilers may pair single divisions with others, and a reciprocal of a far `t` that underflows costs
+/// more than a whole walk.
+#[inline(always)]
+fn reciprocal(dir: Vec3) -> Vec3 {
+    (Vec3A::ONE / Vec3A::from(dir)).into()
 }
 
 /// True when every nonzero |dir| component is in [2^-60, 2^60] and |origin| is at most 2^60.
