@@ -3,6 +3,7 @@
 mod block;
 mod boxes;
 pub mod bvh2;
+pub mod events;
 pub mod kdtree;
 mod leaves;
 pub mod list;

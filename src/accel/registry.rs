@@ -5,6 +5,7 @@ use std::{fmt, str::FromStr};
 use super::{
     Accel, AccelConfig, AccelStats, BuildError, Closest, Counter, HitSink, Refit, TravRay, Violation,
     bvh2::Bvh2,
+    events::Events,
     kdtree::KdTree,
     list::List,
     run::{ClosestPacketTask, ClosestTask, OccludedPacketTask, OccludedTask},
@@ -231,6 +232,8 @@ register_accels! {
     Kdtree => KdTree,
     /// Single slab hierarchy.
     Ssh => Ssh,
+    /// Hierarchy of sorted event lists.
+    Events => Events,
 }
 
 impl AccelKind {
