@@ -3,7 +3,10 @@
 mod block;
 mod boxes;
 pub mod bvh2;
+mod counter;
 pub mod events;
+pub mod grid;
+pub mod grug;
 pub mod kdtree;
 mod leaves;
 pub mod list;
@@ -17,6 +20,7 @@ pub mod ssh;
 mod topology;
 
 pub use boxes::Visitor;
+pub use counter::ReadCounter;
 pub use packet::PACKET;
 pub use query::{AnyHit, Closest, HitSink, TravRay};
 pub use registry::{AccelKind, AccelSpec, AnyAccel, SpecError};
@@ -50,6 +54,16 @@ pub enum BuildError {
         vertex: u32,
         /// How many there are.
         count: usize,
+    },
+    /// A setting that would take more references to primitives, or more bytes, than the structure may hold.
+    #[error("{structure}: more than {limit} references or {bytes} bytes at this setting")]
+    TooLarge {
+        /// The structure's name.
+        structure: &'static str,
+        /// Most references.
+        limit: u64,
+        /// Most bytes of what leaves own.
+        bytes: u64,
     },
     /// A structure's name or setting that does not exist.
     #[error(transparent)]

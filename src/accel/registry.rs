@@ -6,6 +6,8 @@ use super::{
     Accel, AccelConfig, AccelStats, BuildError, Closest, Counter, HitSink, Refit, TravRay, Violation,
     bvh2::Bvh2,
     events::Events,
+    grid::Grid,
+    grug::Grug,
     kdtree::KdTree,
     list::List,
     run::{ClosestPacketTask, ClosestTask, OccludedPacketTask, OccludedTask},
@@ -228,12 +230,16 @@ register_accels! {
     List => List,
     /// Binary hierarchy of boxes.
     Bvh2 => Bvh2,
+    /// Uniform grid.
+    Grid => Grid,
     /// Kd-tree.
     Kdtree => KdTree,
     /// Single slab hierarchy.
     Ssh => Ssh,
     /// Hierarchy of sorted event lists.
     Events => Events,
+    /// Grouped uniform grid over a forest of kd-trees.
+    Grug => Grug,
 }
 
 impl AccelKind {

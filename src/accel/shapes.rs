@@ -116,10 +116,10 @@ fn cut(polygon: &Polygon, axis: usize, plane: f64, side: f64) -> Polygon {
     out
 }
 
-/// The greatest f32 that is not above `x`.
+/// The greatest f32 that is not above `x`; the least finite one where there is none.
 #[expect(clippy::cast_possible_truncation, reason = "the rounding is what is asked for")]
-fn round_down(x: f64) -> f32 {
-    let near = x as f32;
+pub(super) fn round_down(x: f64) -> f32 {
+    let near = x.clamp(f64::from(f32::MIN), f64::from(f32::MAX)) as f32;
     if f64::from(near) > x { near.next_down() } else { near }
 }
 

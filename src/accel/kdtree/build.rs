@@ -56,7 +56,7 @@ pub(in crate::accel) struct Task {
     pub(in crate::accel) cell: Aabb,
     /// Splits that may still follow.
     pub(in crate::accel) depth: usize,
-    /// References that the leaves below may hold together.
+    /// References and splits that the subtree may have together.
     pub(in crate::accel) room: usize,
 }
 
@@ -79,9 +79,18 @@ pub(in crate::accel) fn depth_limit(count: usize) -> usize {
     ((8.0 + 1.3 * libm::log2(count.max(1) as f64)) as usize).min(MAX_DEPTH - 1)
 }
 
-/// References that a tree over `count` objects may hold.
+/// References and splits that a tree over `count` objects may have together.
 pub(in crate::accel) fn room(count: usize) -> usize {
     count.saturating_mul(DUPLICATES).saturating_add(1024)
+}
+
+/// Shares out the room of a node to children of the given counts; a split takes one, and no child gets less than its count. `None` when
+/// there is too little.
+pub(in crate::accel) fn shared_room(room: usize, counts: [usize; 2]) -> Option<[usize; 2]> {
+    let sum = counts[0] + counts[1];
+    let surplus = room.checked_sub(sum + 1)?;
+    // Both factors are below 2^32.
+    Some(counts.map(|count| count + surplus * count / sum.max(1)))
 }
 
 pub(in crate::accel) struct Builder<'a, P: ?Sized> {
@@ -142,17 +151,14 @@ impl<P: Shapes + ?Sized> Builder<'_, P> {
                 upper.push(*r);
             }
         }
-        let (count, sum) = (task.refs.len(), lower.len() + upper.len());
-        if sum > task.room || (lower.len() == count && upper.len() == count) {
+        if lower.len() == task.refs.len() && upper.len() == task.refs.len() {
             return None;
         }
-        // Rounding down keeps the sum of the rooms within the room.
-        let share = |part: usize| part + (task.room - sum) / sum.max(1) * part;
+        let rooms = shared_room(task.room, [lower.len(), upper.len()])?;
         let depth = task.depth - 1;
-        let room = [share(lower.len()), share(upper.len())];
         Some([
-            Task { refs: lower, cell: below, depth, room: room[0] },
-            Task { refs: upper, cell: above, depth, room: room[1] },
+            Task { refs: lower, cell: below, depth, room: rooms[0] },
+            Task { refs: upper, cell: above, depth, room: rooms[1] },
         ])
     }
 

@@ -15,7 +15,7 @@ pub(super) mod build;
 pub(super) mod node;
 pub(super) mod split;
 pub(super) mod traverse;
-mod validate;
+pub(super) mod validate;
 
 use super::{
     Accel, AccelConfig, AccelStats, BuildError, Closest, Counter, HitSink, Refit, TravRay, Violation, Visitor,
@@ -34,8 +34,8 @@ use node::{KdNode, MAX_NUMBER};
 use split::{Costs, MAX_BINS};
 use traverse::{Fast, Wide};
 
-/// Most objects: with every duplicate, nodes and units can still be numbered.
-const MAX_OBJECTS: usize = MAX_NUMBER / 34;
+/// Most objects: with every reference and split that [`build::room`] allows, nodes and units can still be numbered.
+pub(super) const MAX_OBJECTS: usize = MAX_NUMBER / 34;
 
 /// Build settings of `kdtree`.
 #[derive(Clone, Copy, Debug, PartialEq)]
