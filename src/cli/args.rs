@@ -16,6 +16,7 @@ use super::{
     man::ManArgs,
     pose::PoseArgs,
     render::RenderArgs,
+    report::ReportArgs,
     values::{self, SimdChoice},
 };
 
@@ -43,6 +44,8 @@ pub(crate) enum Command {
     Pose(PoseArgs),
     /// Answer rays from a file, timed
     Cast(CastArgs),
+    /// Measure structures, with tables, plots and bounds
+    Report(ReportArgs),
     /// Print a shell's completion script
     Completions(CompletionsArgs),
     /// Print a manual page (roff)

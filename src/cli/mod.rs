@@ -7,6 +7,7 @@ mod args;
 mod cast;
 mod completions;
 mod error;
+mod geometry;
 mod info;
 mod logs;
 mod man;
@@ -15,6 +16,7 @@ mod play;
 mod pose;
 mod progress;
 mod render;
+mod report;
 mod scene;
 mod settings;
 mod shard;
@@ -60,6 +62,7 @@ fn run(cli: &Cli) -> Result<(), CliError> {
         Command::Info(args) => info::run(args, &settings),
         Command::Pose(args) => pose::run(args, &settings),
         Command::Cast(args) => cast::run(args, &settings),
+        Command::Report(args) => report::run(args, &settings),
         Command::Completions(args) => completions::run(args),
         Command::Man(args) => man::run(args),
     }

@@ -2,7 +2,9 @@
 //! shells.
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
-use kinora::{accel::AccelSpec, dynamics::RebuildPolicy, render::Shading, simd::SimdLevel, world::TopKind};
+use kinora::{
+    accel::AccelSpec, dynamics::RebuildPolicy, render::Shading, report::Kind, simd::SimdLevel, world::TopKind,
+};
 
 /// Longest side of a picture in pixels, and its largest area.
 const MAX_SIDE: u32 = 65_535;
@@ -50,6 +52,11 @@ pub(crate) fn simd() -> impl TypedValueParser<Value = SimdChoice> {
 /// The level over groups.
 pub(crate) fn top() -> impl TypedValueParser<Value = TopKind> {
     named(TopKind::ALL.map(|k| (k.name(), k)))
+}
+
+/// What to report.
+pub(crate) fn report() -> impl TypedValueParser<Value = Kind> {
+    named(Kind::ALL.map(|k| (k.name(), k)))
 }
 
 /// A structure with its settings.

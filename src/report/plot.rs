@@ -42,6 +42,17 @@ pub struct Line {
     pub name: String,
     /// Points by ascending x; in [`Bars`] x is the number of a group.
     pub points: Vec<(f64, f64)>,
+    /// Number of its colour.
+    pub color: usize,
+    /// Number of its mark: disc, triangle, cross.
+    pub mark: usize,
+}
+
+impl Line {
+    /// The `i`-th line of a plot: a colour of its own, and another mark when colours begin anew.
+    pub fn new(i: usize, name: impl Into<String>, points: Vec<(f64, f64)>) -> Self {
+        Self { name: name.into(), points, color: i % COLORS.len(), mark: i / COLORS.len() }
+    }
 }
 
 /// Lines over two logarithmic axes.
@@ -140,10 +151,10 @@ fn draw_lines(root: &Area<'_>, title: &str, lines: &Lines) -> Result<(), Failed>
         .axis_style(FRAME)
         .label_style(("sans-serif", 13))
         .draw()?;
-    for (i, line) in lines.lines.iter().enumerate() {
+    for line in &lines.lines {
         let points = line.points.iter().copied().filter(|p| drawable(p.0) && drawable(p.1)).collect::<Vec<_>>();
-        chart.draw_series(LineSeries::new(points.iter().copied(), color(i).stroke_width(2)))?;
-        mark(&plot, &chart, i, &points)?;
+        chart.draw_series(LineSeries::new(points.iter().copied(), color(line).stroke_width(2)))?;
+        mark(&plot, &chart, line, &points)?;
     }
     Ok(())
 }
@@ -179,7 +190,7 @@ fn draw_bars(root: &Area<'_>, title: &str, bars: &Bars) -> Result<(), Failed> {
         let points = line.points.iter().filter(|p| drawable(p.1));
         // Marks of a group stand side by side.
         let shift = (i as f64 + 0.5) / bars.lines.len() as f64 * 0.6 + 0.2;
-        mark(&plot, &chart, i, &points.map(|p| (p.0 + shift, p.1)).collect::<Vec<_>>())?;
+        mark(&plot, &chart, line, &points.map(|p| (p.0 + shift, p.1)).collect::<Vec<_>>())?;
     }
     Ok(())
 }
@@ -191,8 +202,8 @@ fn begin<'a>(root: &Area<'a>, title: &str, lines: &[Line]) -> Result<Area<'a>, F
     #[expect(clippy::cast_possible_wrap, reason = "a picture's width")]
     let (plot, legend) = below.split_horizontally(SIZE.0 as i32 - LEGEND);
     let mut y = 16;
-    for (i, line) in lines.iter().enumerate() {
-        draw_mark(&legend, i, (12, y))?;
+    for line in lines {
+        draw_mark(&legend, line, (12, y))?;
         let style = ("sans-serif", 13).into_font().color(&FRAME).pos(Pos::new(HPos::Left, VPos::Center));
         legend.draw(&Text::new(line.name.clone(), (24, y), style))?;
         y += 20;
@@ -204,7 +215,7 @@ fn begin<'a>(root: &Area<'a>, title: &str, lines: &[Line]) -> Result<Area<'a>, F
 fn mark<X: Ranged<ValueType = f64>>(
     plot: &Area<'_>,
     chart: &LogChart<'_, '_, X>,
-    line: usize,
+    line: &Line,
     points: &[(f64, f64)],
 ) -> Result<(), Failed> {
     let origin = plot.get_base_pixel();
@@ -214,32 +225,32 @@ fn mark<X: Ranged<ValueType = f64>>(
     })
 }
 
-/// The mark of a line: its colour, and a form that changes when colours begin anew.
-fn draw_mark(area: &Area<'_>, line: usize, at: (i32, i32)) -> Result<(), Failed> {
-    match line / COLORS.len() % 3 {
+fn draw_mark(area: &Area<'_>, line: &Line, at: (i32, i32)) -> Result<(), Failed> {
+    match line.mark % 3 {
         0 => area.draw(&Circle::new(at, 4, color(line).filled())),
         1 => area.draw(&TriangleMarker::new(at, 6, color(line).filled())),
         _ => area.draw(&Cross::new(at, 4, color(line).stroke_width(2))),
     }
 }
 
-fn color(line: usize) -> RGBColor {
-    COLORS[line % COLORS.len()]
+fn color(line: &Line) -> RGBColor {
+    COLORS[line.color % COLORS.len()]
 }
 
 fn drawable(x: f64) -> bool {
     x.is_finite() && x > 0.0
 }
 
-/// The whole decades that hold all values.
+/// The whole decades that hold all values, but for a tenth at either end.
 fn decades(lines: &[Line], value: impl Fn(&(f64, f64)) -> f64) -> (f64, f64) {
     let values = lines.iter().flat_map(|l| &l.points).map(value).filter(|&v| drawable(v));
     let (low, high) = values.fold((f64::INFINITY, 0.0_f64), |(low, high), v| (low.min(v), high.max(v)));
     if low > high {
         return (1.0, 10.0);
     }
-    let (first, last) = (libm::floor(libm::log10(low)), libm::ceil(libm::log10(high)));
-    (libm::pow(10.0, first), libm::pow(10.0, last.max(first + 1.0)))
+    let first = libm::floor(libm::log10(low * 1.1));
+    let last = libm::ceil(libm::log10(high / 1.1)).max(first + 1.0);
+    (libm::pow(10.0, first).min(low), libm::pow(10.0, last).max(high))
 }
 
 /// A number in few characters.
@@ -263,7 +274,7 @@ mod tests {
 
     #[test]
     fn axes_take_whole_decades() {
-        let line = |points: &[(f64, f64)]| vec![Line { name: "a".into(), points: points.to_vec() }];
+        let line = |points: &[(f64, f64)]| vec![Line::new(0, "a", points.to_vec())];
         assert_eq!(decades(&line(&[(1.0, 3.0), (2.0, 450.0)]), |p| p.1), (1.0, 1000.0));
         assert_eq!(decades(&line(&[(1.0, 0.0), (2.0, f64::NAN)]), |p| p.1), (1.0, 10.0));
         assert_eq!(decades(&line(&[(1.0, 100.0)]), |p| p.1), (100.0, 1000.0));
@@ -272,6 +283,24 @@ mod tests {
     #[test]
     fn labels_are_short() {
         assert_eq!(["1k", "10M", "0.01", "5"], [1e3, 1e7, 0.01, 5.0].map(short).each_ref().map(String::as_str));
+    }
+
+    #[test]
+    fn plots_are_well_formed_and_hold_every_name_and_mark() {
+        let points = vec![(968.0, 3.0), (10_000.0, 0.0), (100_000.0, 45.0)];
+        let lines: Vec<Line> = (0..12).map(|i| Line::new(i, format!("line <{i}>"), points.clone())).collect();
+        let charts = [
+            Chart::Lines(Lines { x: "n & m".into(), y: "ns".into(), lines: lines.clone() }),
+            Chart::Bars(Bars { groups: vec!["one".into(), "two".into()], y: "ns".into(), lines }),
+        ];
+        for chart in charts {
+            let svg = Plot::new("p", "A & B", chart).svg().unwrap();
+            assert!(svg.starts_with("<svg ") && svg.trim_end().ends_with("</svg>"), "{svg}");
+            assert!(svg.contains("line &lt;11&gt;") && svg.contains("A &amp; B"));
+            // Ten discs at two points each, and ten in the legend.
+            assert_eq!(svg.matches("<circle").count(), 30);
+            assert!(!svg.contains("NaN") && !svg.contains("inf"));
+        }
     }
 
     #[test]

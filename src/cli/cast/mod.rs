@@ -1,8 +1,5 @@
 //! `kinora cast`: batch ray queries from files, timed.
 
-mod bytes;
-mod geometry;
-mod mesh_files;
 mod queries;
 
 use std::{path::PathBuf, time::Instant};
@@ -15,8 +12,12 @@ use kinora::{
 };
 use serde::Serialize;
 
-use super::{error::CliError, settings::Settings, stdout};
-use geometry::Frames;
+use super::{
+    error::CliError,
+    geometry::{self, Frames},
+    settings::Settings,
+    stdout,
+};
 use queries::{Queries, RAY_BYTES};
 
 /// Arguments of `cast`.

@@ -10,8 +10,7 @@ use kinora::{
 };
 use rayon::prelude::*;
 
-use super::bytes;
-use crate::cli::error::CliError;
+use crate::cli::{error::CliError, geometry::bytes};
 
 /// Bytes of a ray: origin, `t_near`, direction, `t_far`.
 pub(super) const RAY_BYTES: usize = 32;

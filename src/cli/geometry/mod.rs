@@ -1,5 +1,8 @@
 //! Geometry from files: soups of corners, welded into one indexed mesh over all frames.
 
+pub(crate) mod bytes;
+mod mesh_files;
+
 use std::{collections::HashMap, path::Path};
 
 use kinora::{
@@ -7,23 +10,22 @@ use kinora::{
     glam::{DAffine3, Vec3},
 };
 
-use super::{bytes, mesh_files};
-use crate::cli::{error::CliError, scene, settings::Settings};
+use super::{error::CliError, scene, settings::Settings};
 
 /// Triangles over vertices that have a place in every frame.
 #[derive(Debug)]
-pub(super) struct Frames {
+pub(crate) struct Frames {
     /// Positions by frame.
-    pub(super) positions: Vec<Vec<Vec3>>,
+    pub(crate) positions: Vec<Vec<Vec3>>,
     /// Corners of each triangle.
-    pub(super) indices: Vec<[u32; 3]>,
+    pub(crate) indices: Vec<[u32; 3]>,
 }
 
 /// Reads all frames and welds corners whose bits agree in every one.
 ///
 /// # Errors
 /// A usage error naming the file and what is wrong with it.
-pub(super) fn read(files: &[String], settings: &Settings) -> Result<Frames, CliError> {
+pub(crate) fn read(files: &[String], settings: &Settings) -> Result<Frames, CliError> {
     let mut frames = Vec::with_capacity(files.len());
     for file in files {
         let corners = read_corners(file, settings)?;
@@ -44,11 +46,19 @@ pub(super) fn read(files: &[String], settings: &Settings) -> Result<Frames, CliE
     Ok(weld(&frames))
 }
 
+/// True for a file of triangles alone, false for a scene.
+pub(crate) fn is_mesh(file: &str) -> bool {
+    matches!(extension(file).as_deref(), Some("tris" | "ply" | "obj" | "stl"))
+}
+
+fn extension(file: &str) -> Option<String> {
+    Path::new(file).extension().map(|e| e.to_ascii_lowercase().to_string_lossy().into_owned())
+}
+
 /// Three corners a triangle, in file order.
 fn read_corners(file: &str, settings: &Settings) -> Result<Vec<Vec3>, CliError> {
     let path = Path::new(file);
-    let extension = path.extension().map(|e| e.to_ascii_lowercase().to_string_lossy().into_owned());
-    match extension.as_deref() {
+    match extension(file).as_deref() {
         Some("tris") => {
             let content = bytes::read(path)?;
             let mut floats = bytes::floats(bytes::records(path, &content, "TRI1", 36)?);

@@ -8,12 +8,12 @@ use crate::cli::error::CliError;
 ///
 /// # Errors
 /// A usage error naming the file.
-pub(super) fn read(path: &Path) -> Result<Vec<u8>, CliError> {
+pub(crate) fn read(path: &Path) -> Result<Vec<u8>, CliError> {
     std::fs::read(path).map_err(|e| CliError::usage(format!("{}: cannot read: {e}", path.display())))
 }
 
 /// A usage error about a file's content.
-pub(super) fn invalid(path: &Path, reason: impl std::fmt::Display) -> CliError {
+pub(crate) fn invalid(path: &Path, reason: impl std::fmt::Display) -> CliError {
     CliError::usage(format!("{}: {reason}", path.display()))
 }
 
@@ -21,7 +21,7 @@ pub(super) fn invalid(path: &Path, reason: impl std::fmt::Display) -> CliError {
 ///
 /// # Errors
 /// A usage error when magic or length are wrong.
-pub(super) fn records<'a>(path: &Path, bytes: &'a [u8], magic: &str, size: usize) -> Result<&'a [u8], CliError> {
+pub(crate) fn records<'a>(path: &Path, bytes: &'a [u8], magic: &str, size: usize) -> Result<&'a [u8], CliError> {
     let header = bytes.split_at_checked(8).filter(|(head, _)| head.starts_with(magic.as_bytes()));
     let Some((head, rest)) = header else {
         return Err(invalid(path, format!("does not begin with `{magic}` and a count")));
@@ -38,6 +38,6 @@ pub(super) fn records<'a>(path: &Path, bytes: &'a [u8], magic: &str, size: usize
 }
 
 /// All f32 of a slice whose length is a multiple of 4.
-pub(super) fn floats(bytes: &[u8]) -> impl Iterator<Item = f32> + '_ {
+pub(crate) fn floats(bytes: &[u8]) -> impl Iterator<Item = f32> + '_ {
     bytes.as_chunks::<4>().0.iter().map(|&b| f32::from_le_bytes(b))
 }

@@ -1,0 +1,122 @@
+//! `kinora report`: measurements with tables and plots.
+
+mod monitor;
+
+use std::path::PathBuf;
+
+use clap::Args;
+use kinora::{
+    accel::AccelSpec,
+    output::{Unfinished, atomic},
+    report::{
+        Kind, Report, ReportError, Subject,
+        baseline::{Baseline, Changes},
+        structures,
+    },
+};
+
+use self::monitor::Watching;
+use super::{error::CliError, geometry, scene, settings::Settings, signals::Signals, stdout, values};
+
+/// Arguments of `report`.
+#[derive(Debug, Args)]
+pub(crate) struct ReportArgs {
+    /// What to measure
+    #[arg(value_name = "KIND", value_parser = values::report())]
+    kind: Kind,
+    /// Scenes or meshes (.gltf, .glb, builtin:NAME, .tris, .ply, .obj, .stl); without any: the built-in scenes, generated meshes, and growth
+    /// over the number of triangles
+    #[arg(value_name = "SCENE")]
+    scenes: Vec<String>,
+    /// Folder for KIND.json, KIND.md and the plots
+    #[arg(long, value_name = "DIR", default_value = "report")]
+    output: PathBuf,
+    /// Fewer rays, repeats and sizes: under a minute on two cores
+    #[arg(long)]
+    quick: bool,
+    /// End with exit code 1 when a stated bound or target is missed, naming which
+    #[arg(long)]
+    check: bool,
+    /// Print what changed against the KIND.json of an earlier run; with --check, values that became worse are missed bounds
+    #[arg(long, value_name = "FILE")]
+    baseline: Option<PathBuf>,
+}
+
+/// Measures and writes the files.
+///
+/// # Errors
+/// A usage error for scenes or a baseline that cannot be read, a failure when files cannot be written or, with `--check`, a bound is
+/// missed.
+pub(crate) fn run(args: &ReportArgs, settings: &Settings) -> Result<(), CliError> {
+    let baseline = args.baseline.as_deref().map(|file| Baseline::read(file, args.kind)).transpose()?;
+    atomic::prepare(&args.output.join(format!("{}.json", args.kind.name())))?;
+    let subjects = args.scenes.iter().map(|s| subject(s, settings)).collect::<Result<Vec<_>, _>>()?;
+    let unfinished = Unfinished::default();
+    let signals = Signals::watch(&unfinished)?;
+    let mut watching = Watching::new(&signals, settings.verbosity);
+    let made = settings.pool.install(|| measure(args, &subjects, settings, &mut watching));
+    watching.end();
+    signals.check()?;
+    let mut report = made?;
+    let changes = baseline.as_ref().map(|b| b.compare(&report));
+    if let Some(changes) = changes.as_ref().filter(|_| args.check) {
+        report.checks.extend(changes.checks());
+    }
+    let files = report.write(&args.output, &unfinished)?;
+    stdout::write(text(args, &report, &files, baseline.as_ref().zip(changes.as_ref())).as_bytes())?;
+    verdict(args, &report)
+}
+
+fn measure(
+    args: &ReportArgs,
+    subjects: &[Subject],
+    settings: &Settings,
+    watching: &mut Watching<'_>,
+) -> Result<Report, ReportError> {
+    match args.kind {
+        Kind::Structures => {
+            let mut options = structures::Options { simd: settings.simd, ..structures::Options::new(args.quick) };
+            let asked: Result<AccelSpec, _> = settings.accel.parse();
+            options.specs.extend(asked.ok().filter(|spec| !options.specs.contains(spec)));
+            structures::report(subjects, &options, watching)
+        }
+    }
+}
+
+fn subject(file: &str, settings: &Settings) -> Result<Subject, CliError> {
+    if !geometry::is_mesh(file) {
+        return Ok(Subject::from_scene(file, &scene::load(Some(file), settings)?));
+    }
+    let mut frames = geometry::read(&[file.to_owned()], settings)?;
+    Ok(Subject::still(file, frames.positions.swap_remove(0), frames.indices))
+}
+
+/// What goes to stdout: the files, the bounds, and what changed.
+fn text(args: &ReportArgs, report: &Report, files: &[String], changes: Option<(&Baseline, &Changes)>) -> String {
+    let mut out: String = files.iter().map(|f| format!("{}\n", args.output.join(f).display())).collect();
+    for check in &report.checks {
+        out += &format!("{check}\n");
+    }
+    if let Some((baseline, changes)) = changes {
+        out += &format!("against {}:\n{changes}", baseline.origin());
+    }
+    out
+}
+
+fn verdict(args: &ReportArgs, report: &Report) -> Result<(), CliError> {
+    let missed: Vec<&str> = report.missed().map(|c| c.claim.as_str()).collect();
+    if missed.is_empty() || !args.check {
+        return Ok(());
+    }
+    Err(CliError::failed(format!("{} of {} bounds missed: {}", missed.len(), report.checks.len(), missed.join("; "))))
+}
+
+impl From<ReportError> for CliError {
+    fn from(error: ReportError) -> Self {
+        match error {
+            ReportError::Baseline { .. } | ReportError::Import(_) => Self::usage(error.to_string()),
+            ReportError::Build(error) => error.into(),
+            _ => Self::failed(error.to_string()),
+        }
+    }
+}

@@ -1,0 +1,177 @@
+//! `kinora report`: files, rows, bounds, comparison with an earlier run, and what it refuses.
+#![cfg(feature = "cli")]
+
+use std::{fs, path::Path};
+
+use assert_cmd::Command;
+use serde_json::Value;
+
+fn kinora() -> Command {
+    Command::cargo_bin("kinora").expect("the program is built")
+}
+
+/// A small wavy grid: quick to measure with every structure.
+fn mesh(folder: &Path) -> String {
+    const SIDE: usize = 12;
+    let mut text = String::new();
+    for i in 0..SIDE * SIDE {
+        let (x, y) = (i % SIDE, i / SIDE);
+        text += &format!("v {x} {} {y}\n", x * y % 5);
+    }
+    for i in (0..SIDE * (SIDE - 1)).filter(|i| i % SIDE < SIDE - 1) {
+        let (a, b) = (i + 1, i + 1 + SIDE);
+        text += &format!("f {a} {} {} {b}\n", a + 1, b + 1);
+    }
+    let path = folder.join("grid.obj");
+    fs::write(&path, text).expect("written");
+    path.display().to_string()
+}
+
+fn measure(mesh: &str, output: &Path, extra: &[&str]) -> Command {
+    let mut command = kinora();
+    command.args(["report", "structures", mesh, "--quick", "--threads", "1", "--output"]).arg(output).args(extra);
+    command
+}
+
+fn json(folder: &Path) -> Value {
+    serde_json::from_slice(&fs::read(folder.join("structures.json")).expect("written")).expect("JSON")
+}
+
+/// Names of the structures of this build, as `--accel` lists them.
+fn structures() -> Vec<&'static str> {
+    kinora::accel::AccelKind::ALL.iter().map(|k| k.name()).collect()
+}
+
+#[test]
+fn every_structure_has_rows_and_all_files_are_written() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let out = dir.path().join("new/report");
+    let assert = measure(&mesh(dir.path()), &out, &["--check"]).assert().success();
+    let stdout = String::from_utf8_lossy(&assert.get_output().stdout).into_owned();
+    let report = json(&out);
+    assert_eq!((&report["schema"], &report["kind"]), (&1.into(), &"structures".into()));
+    for (key, is_right) in [
+        ("commit", report["commit"].is_string()),
+        ("machine", report["machine"]["cpu"].is_string() && report["machine"]["cores"].as_u64() > Some(0)),
+        ("settings", report["settings"]["quick"] == true && report["settings"]["threads"] == 1),
+        ("date", report["date"].as_str().is_some_and(|d| d.len() == 10)),
+    ] {
+        assert!(is_right, "{key}: {}", report[key]);
+    }
+    let rows = report["rows"].as_array().expect("rows");
+    for name in structures() {
+        let of =
+            |table: &str| rows.iter().filter(|r| r["table"] == table && r["structure"] == name).collect::<Vec<_>>();
+        let [build] = of("build")[..] else { panic!("{name}: one row of builds") };
+        assert!(build["triangles"] == 242 && build["build_ms"].as_f64() > Some(0.0), "{build}");
+        assert!(build["refit_ms"].as_f64() > Some(0.0) || build["note"].is_string(), "{build}");
+        let rays = of("rays");
+        assert_eq!(rays.len(), 4, "{name}: primary, shadow, ao, diffuse");
+        for row in rays {
+            assert_eq!(row["differences"], 0, "{row}");
+            assert!(row["single_mrays_per_s"].as_f64() > Some(0.0) && row["packet_mrays_per_s"].as_f64() > Some(0.0));
+            let counted = ["nodes", "tests", "blocks", "steps", "events"];
+            assert!(counted.iter().any(|c| row[format!("{c}_per_ray")].as_f64() > Some(0.0)), "{row}");
+        }
+    }
+    let mut files: Vec<String> =
+        fs::read_dir(&out).expect("a folder").map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
+    files.sort();
+    for file in &files {
+        assert!(stdout.contains(file.as_str()), "{file} is named on stdout");
+    }
+    let plots: Vec<&String> = files.iter().filter(|f| f.ends_with(".svg")).collect();
+    assert_eq!(plots.len(), report["plots"].as_array().map_or(0, Vec::len));
+    assert_eq!(files.len(), plots.len() + 2, "{files:?}");
+    let markdown = fs::read_to_string(out.join("structures.md")).expect("written");
+    for plot in plots {
+        let svg = fs::read_to_string(out.join(plot)).expect("written");
+        assert!(svg.starts_with("<svg ") && svg.trim_end().ends_with("</svg>"));
+        assert!(markdown.contains(plot.as_str()));
+    }
+    for line in markdown.lines().filter(|l| l.starts_with('|')) {
+        assert!(line.ends_with('|'), "{line}");
+    }
+}
+
+#[test]
+fn counts_are_the_same_in_every_run_and_a_worse_count_fails_the_check() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let (mesh, first) = (mesh(dir.path()), dir.path().join("first"));
+    measure(&mesh, &first, &[]).assert().success();
+    let baseline = first.join("structures.json");
+    let against = |extra: &[&str]| {
+        let mut args = vec!["--baseline", baseline.to_str().unwrap()];
+        args.extend(extra);
+        measure(&mesh, &dir.path().join("second"), &args)
+    };
+    let assert = against(&[]).assert().success();
+    let stdout = String::from_utf8_lossy(&assert.get_output().stdout).into_owned();
+    assert!(!stdout.contains("counted)"), "{stdout}");
+    assert!(stdout.contains("0 rows new, 0 gone"), "{stdout}");
+
+    let mut report = json(&first);
+    let rows = report["rows"].as_array_mut().expect("rows");
+    let row = rows.iter_mut().find(|r| r["table"] == "build" && r["structure"] == "bvh2").expect("bvh2 has a row");
+    row["node_bytes_per_triangle"] = 1.0.into();
+    fs::write(&baseline, report.to_string()).expect("written");
+    against(&[]).assert().success();
+    let assert = against(&["--check"]).assert().code(1);
+    let output = assert.get_output();
+    let (stdout, stderr) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
+    assert!(stdout.contains("worse: build") && stdout.contains("bvh2 / node_bytes_per_triangle: 1.0000"), "{stdout}");
+    assert!(stderr.contains("counted values worse than the baseline"), "{stderr}");
+}
+
+#[test]
+fn what_cannot_be_used_ends_in_exit_2_with_a_reason_and_no_files() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let mesh = mesh(dir.path());
+    let refuses = |args: &[&str], reason: &str| {
+        let out = dir.path().join("none");
+        let assert = kinora().args(["report", "--output"]).arg(&out).args(args).assert().code(2);
+        let message = String::from_utf8_lossy(&assert.get_output().stderr).into_owned();
+        assert!(message.contains(reason), "{message}");
+        assert!(!out.join("structures.json").exists());
+    };
+    refuses(&["frames"], "possible values: ");
+    refuses(&["accuracy"], "structures");
+    refuses(&["structures", "missing.glb"], "missing.glb");
+    refuses(&["structures", &mesh, "--baseline", "missing.json"], "missing.json: cannot read");
+    refuses(&["structures", &mesh, "--baseline", &mesh], "no report");
+    let other = dir.path().join("other.json");
+    fs::write(&other, r#"{"schema": 1, "kind": "frames", "rows": []}"#).expect("written");
+    refuses(&["structures", &mesh, "--baseline", other.to_str().unwrap()], "of kind \"frames\"");
+    fs::write(&other, r#"{"schema": 99}"#).expect("written");
+    refuses(&["structures", &mesh, "--baseline", other.to_str().unwrap()], "schema version 99");
+}
+
+#[test]
+fn an_output_that_is_no_folder_ends_in_exit_1_before_anything_is_measured() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let mesh = mesh(dir.path());
+    measure(&mesh, Path::new(&mesh), &[]).assert().code(1);
+}
+
+#[cfg(unix)]
+#[test]
+fn an_interrupt_leaves_no_file() {
+    use std::{
+        process::{Command as Process, Stdio},
+        thread::sleep,
+        time::Duration,
+    };
+    let dir = tempfile::tempdir().expect("a folder");
+    let mut child = Process::new(assert_cmd::cargo::cargo_bin!("kinora"))
+        .args(["report", "structures", "--output"])
+        .arg(dir.path())
+        .stderr(Stdio::null())
+        .stdout(Stdio::null())
+        .spawn()
+        .expect("starts");
+    sleep(Duration::from_millis(400));
+    let id = child.id().to_string();
+    assert!(Process::new("kill").args(["-INT", &id]).status().expect("kill runs").success());
+    assert_eq!(child.wait().expect("ends").code(), Some(130));
+    assert_eq!(fs::read_dir(dir.path()).expect("a folder").count(), 0);
+}
