@@ -56,7 +56,7 @@ fn material(x: u32, y: u32, z: u32) -> SpdSurface {
         channel(3 * z + 2 * x + y + 1, 2),
     );
     let color = color / color.max_element();
-    if (4 * x + 2 * y + z) % 5 == 0 {
+    if (4 * x + 2 * y + z).is_multiple_of(5) {
         SpdSurface { color, diffuse: 0.2, transmittance: 0.8, ior: 1.1, two_sided: true, ..SpdSurface::MATT }
     } else {
         SpdSurface { color, ..SpdSurface::MATT }
