@@ -24,8 +24,10 @@ use crate::{
 };
 
 pub(crate) use group::{GroupFrame, GroupLayout};
+pub(crate) use slab::SlabRay;
 pub(crate) use top::Top;
 pub use top::TopKind;
+pub(crate) use top_tree::{STACK, TopTree};
 
 /// One part instance of a world: which actor it belongs to and what it is there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -7,7 +7,7 @@ const BINS: usize = 12;
 const SAH_DEPTH: usize = 16;
 
 /// Places on the stack of a walk: one node waits a level, and both children are there for a moment.
-pub(super) const STACK: usize = SAH_DEPTH + 34;
+pub(crate) const STACK: usize = SAH_DEPTH + 34;
 
 /// A binary tree over the boxes of groups, one group a leaf.
 ///
@@ -20,11 +20,11 @@ pub(crate) struct TopTree {
 }
 
 #[derive(Clone, Copy, Debug)]
-pub(super) struct TopNode {
-    pub(super) aabb: Aabb,
+pub(crate) struct TopNode {
+    pub(crate) aabb: Aabb,
     /// First of two children that follow each other, or the group when `leaf`.
-    pub(super) link: u32,
-    pub(super) leaf: bool,
+    pub(crate) link: u32,
+    pub(crate) leaf: bool,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -71,7 +71,7 @@ impl TopTree {
     }
 
     /// The root first; empty without boxes.
-    pub(super) fn nodes(&self) -> &[TopNode] {
+    pub(crate) fn nodes(&self) -> &[TopNode] {
         &self.nodes
     }
 }

@@ -1,1 +1,4 @@
 //! The papers' tables beside ours.
+
+pub mod objects;
+pub mod spd;

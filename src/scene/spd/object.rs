@@ -48,7 +48,7 @@ pub enum SpdShape {
 /// Material after the package's neutral file format.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SpdSurface {
-    /// Linear colour.
+    /// Colour as pictures show it: sRGB.
     pub color: DVec3,
     /// Diffuse part.
     pub diffuse: f64,
@@ -105,7 +105,7 @@ pub struct SpdScene {
     pub view: SpdView,
     /// Point lights without falloff; each has the intensity `sqrt(L) / (2 L)` of L lights, and so has the ambient light.
     pub lights: Vec<DVec3>,
-    /// Linear colour of rays that hit nothing.
+    /// Colour of rays that hit nothing, sRGB.
     pub background: DVec3,
 }
 

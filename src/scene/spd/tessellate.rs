@@ -13,10 +13,10 @@ use crate::scene::{
 
 /// Largest distance between a round primitive and its triangles, seen from the scene's eye, over the picture's height there.
 const TOLERANCE: f64 = 1.0 / 4096.0;
-/// Triangles above which round primitives are cut more coarsely.
+/// Triangles above which [`SpdScene::tessellate`] cuts round primitives more coarsely.
 const BUDGET: usize = 4_000_000;
 /// Doublings of the tolerance that are tried.
-const COARSEST: i32 = 8;
+const COARSEST: i32 = 12;
 /// Fewest and most segments around a round primitive.
 const SEGMENTS: (f64, f64) = (4.0, 256.0);
 
@@ -30,7 +30,12 @@ impl SpdScene {
     ///
     /// Cost: up to about 10 million triangles at the largest size factors.
     pub fn tessellate(&self) -> Scene {
-        let lens = Lens::fitting(self);
+        self.tessellate_within(BUDGET)
+    }
+
+    /// As [`SpdScene::tessellate`], with round primitives cut so coarsely that there are at most `triangles`, if they can be.
+    pub fn tessellate_within(&self, triangles: usize) -> Scene {
+        let lens = Lens::fitting(self, triangles);
         let parts = (0u32..).zip(&self.surfaces).map(|(i, _)| self.part(i, &lens)).collect();
         let mut scene = Scene {
             file: format!("builtin:spd-{}:{}", self.kind.name(), self.size),
@@ -48,13 +53,14 @@ impl SpdScene {
         scene
     }
 
-    /// Segments around a round primitive that [`SpdScene::tessellate`] would use, and how far its triangles may then be from it.
-    ///
-    /// `None` for polygons and patches, which are cut exactly.
-    pub fn chord_error(&self, object: &SpdObject) -> Option<f64> {
-        let lens = Lens::fitting(self);
-        let (center, radius) = roundness(&object.shape)?;
-        Some(sagitta(lens.segments(center, radius), radius))
+    /// How far any triangle of [`SpdScene::tessellate_within`] may be from the primitive that it stands for, but for roundings to f32.
+    pub fn chord_error(&self, triangles: usize) -> f64 {
+        let lens = Lens::fitting(self, triangles);
+        let error = |object: &SpdObject| {
+            let (center, radius) = roundness(&object.shape)?;
+            Some(sagitta(lens.segments(center, radius), radius))
+        };
+        self.objects.iter().filter_map(error).fold(0.0, f64::max)
     }
 
     /// From the database's axes to +Y up.
@@ -126,11 +132,11 @@ struct Lens {
 }
 
 impl Lens {
-    /// The finest that keeps to the budget.
-    fn fitting(scene: &SpdScene) -> Self {
+    /// The finest that keeps to a number of triangles.
+    fn fitting(scene: &SpdScene, triangles: usize) -> Self {
         let height = 2.0 * libm::tan(scene.view.angle_deg.to_radians() / 2.0);
         let lens = |k: i32| Self { eye: scene.view.from, slope: TOLERANCE * height * f64::from(1 << k) };
-        (0..COARSEST).map(lens).find(|lens| lens.triangles(scene) <= BUDGET).unwrap_or_else(|| lens(COARSEST))
+        (0..COARSEST).map(lens).find(|lens| lens.triangles(scene) <= triangles).unwrap_or_else(|| lens(COARSEST))
     }
 
     fn triangles(&self, scene: &SpdScene) -> usize {
@@ -200,8 +206,9 @@ fn add_node(scene: &mut Scene, node: SceneNode) {
 fn material(surface: &SpdSurface) -> Material {
     let solid = surface.diffuse + surface.specular;
     let level = if solid > 0.0 { (solid / (solid + surface.transmittance)).min(1.0) } else { 0.0 };
-    let color = (surface.color * if surface.transmittance > 0.0 { 1.0 } else { level }).as_vec3();
     let glass = surface.transmittance > 0.0;
+    let linear = DVec3::from_array(surface.color.to_array().map(linear));
+    let color = (linear * if glass { 1.0 } else { level }).as_vec3();
     Material {
         base_color: Vec4::from((color, if glass { (1.0 - surface.transmittance) as f32 } else { 1.0 })),
         metallic: if solid > 0.0 && !glass { (surface.specular / solid) as f32 } else { 0.0 },
@@ -217,4 +224,9 @@ fn material(surface: &SpdSurface) -> Material {
         double_sided: surface.two_sided,
         ..Material::default()
     }
+}
+
+/// The package's colours are what its pictures show: sRGB.
+fn linear(x: f64) -> f64 {
+    if x <= 0.04045 { x / 12.92 } else { libm::pow((x + 0.055) / 1.055, 2.4) }
 }
