@@ -149,6 +149,8 @@ pub trait Accel: Sized + Clone + Send + Sync + std::fmt::Debug + 'static {
     const NAME: &'static str;
     /// Build settings.
     type Config: AccelConfig;
+    /// False when every refit asks for a rebuild.
+    const REFITS: bool = true;
     /// What a walk leaves for rays that start where it ended; `()` where nothing is gained.
     type RayState: Clone + Default + std::fmt::Debug;
 

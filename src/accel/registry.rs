@@ -119,6 +119,13 @@ macro_rules! register_accels {
                 }
             }
 
+            /// As [`Accel::REFITS`].
+            pub fn refits(&self) -> bool {
+                match self {
+                    $(Self::$kind(_) => <$ty>::REFITS,)*
+                }
+            }
+
             /// As [`Accel::refit_into`]; an `out` of another kind is replaced by a copy first.
             pub fn refit_into(&self, out: &mut Self, prims: &Triangles<'_>) -> Refit {
                 if self.kind() != out.kind() {

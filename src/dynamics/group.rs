@@ -144,6 +144,9 @@ impl Group {
     }
 
     fn refit(&mut self, from: &Arc<AnyAccel>, spec: &AccelSpec) -> Result<Work, FrameError> {
+        if !from.refits() {
+            return self.build(spec);
+        }
         let mut next = self.accel_pool.take(|| AnyAccel::clone(from));
         let out = Arc::get_mut(&mut next).expect("a taken buffer has one owner");
         match from.refit_into(out, &self.shape.layout.triangles(&self.positions)) {
@@ -158,7 +161,9 @@ impl Group {
 
     fn build(&mut self, spec: &AccelSpec) -> Result<Work, FrameError> {
         let accel = Arc::new(spec.build(&self.shape.layout.triangles(&self.positions))?);
-        self.accel_pool.keep(accel.clone());
+        if accel.refits() {
+            self.accel_pool.keep(accel.clone());
+        }
         self.accel = Some(accel);
         self.moved_since_build = false;
         Ok(Work { builds: 1, ..Work::default() })

@@ -243,6 +243,7 @@ impl Grid {
 impl Accel for Grid {
     const NAME: &'static str = "grid";
     type Config = GridConfig;
+    const REFITS: bool = false;
     type RayState = ();
 
     fn build(prims: &Triangles<'_>, config: &GridConfig) -> Result<Self, BuildError> {

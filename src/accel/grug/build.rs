@@ -27,8 +27,8 @@ const TASK: usize = 4096;
 /// Planes that are tried along an axis.
 const PLANES: u32 = 64;
 
-/// Resolutions that `res=auto` tries in turn.
-const RESOLUTIONS: [u32; 4] = [64, 128, 256, 512];
+/// The finest grid: nine bits an axis.
+pub(super) const MAX_RES: u32 = 512;
 
 /// Cells a group below which `res=auto` tries a finer grid.
 const CELLS_PER_GROUP: usize = 8;
@@ -82,21 +82,17 @@ pub(super) struct Built {
 pub(super) fn build(shapes: &(impl Shapes + ?Sized), config: &GrugConfig) -> Built {
     let refs = refs(shapes);
     let bounds = bounds(&refs);
-    let tried = RESOLUTIONS.into_iter().filter(|&r| config.res.is_none_or(|res| res == r));
-    let mut found = None;
-    for res in tried {
+    let mut res = config.res.unwrap_or_else(|| first_guess(refs.len()));
+    let (lattice, forest) = loop {
         let lattice = lattice(&bounds, res);
-        let aligned =
-            Aligned { builder: Builder { shapes, params: config.tree.params(BLOCK), unit: BLOCK }, lattice: &lattice };
-        let forest = aligned.forest(refs.clone());
-        let enough =
-            lattice.cells.map(|c| c as usize).iter().product::<usize>() >= CELLS_PER_GROUP * forest.groups.len();
-        found = Some((lattice, forest, res));
-        if enough {
-            break;
+        let builder = Builder { shapes, params: config.tree.params(BLOCK), unit: BLOCK };
+        let forest = Aligned { builder, lattice: &lattice }.forest(refs.clone());
+        let cells = (res as usize).pow(3);
+        if config.res.is_some() || res == MAX_RES || cells >= CELLS_PER_GROUP * forest.groups.len() {
+            break (lattice, forest);
         }
-    }
-    let (lattice, forest, res) = found.expect("every resolution that can be asked for is in the list");
+        res *= 2;
+    };
     let hash = Hash { bits: res.trailing_zeros(), order: config.order };
     let mut table = vec![0; hash.len()];
     for &group in &forest.groups {
@@ -106,6 +102,15 @@ pub(super) fn build(shapes: &(impl Shapes + ?Sized), config: &GrugConfig) -> Bui
     }
     let Forest { emitted: Emitted { nodes, items }, groups } = forest;
     Built { bounds, lattice, hash, table, nodes, items, groups }
+}
+
+/// Where `res=auto` begins: a power of two, at most as many cells as an eighth of the objects for large scenes.
+fn first_guess(count: usize) -> u32 {
+    let mut res = 4;
+    while res < MAX_RES && (2 * res as usize).pow(3) <= count / 8 {
+        res *= 2;
+    }
+    res
 }
 
 /// Cells over a box that is 2 units in the last place larger on every side, and nowhere much thinner than it is long.

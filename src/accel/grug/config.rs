@@ -1,4 +1,4 @@
-use super::table::CellOrder;
+use super::{build::MAX_RES, table::CellOrder};
 use crate::accel::{AccelConfig, kdtree::KdConfig};
 
 /// How rays get from one group to the next.
@@ -13,7 +13,7 @@ pub enum StepMode {
 /// Build settings of `grug`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GrugConfig {
-    /// Cells along each axis: 64, 128, 256 or 512; `None` takes the first of them with eight cells a group or more.
+    /// Cells along each axis, a power of two from 4 to 512; `None` (`res=auto`) takes the first with eight cells a group or more.
     pub res: Option<u32>,
     /// How rays get from one group to the next.
     pub mode: StepMode,
@@ -35,8 +35,13 @@ impl AccelConfig for GrugConfig {
     fn set(&mut self, key: &str, value: &str) -> Result<(), String> {
         match (key, value) {
             ("res", "auto") => self.res = None,
-            ("res", "64" | "128" | "256" | "512") => self.res = value.parse().ok(),
-            ("res", _) => return Err(format!("`{value}` is none of auto, 64, 128, 256, 512")),
+            ("res", _) => {
+                let res = value.parse().ok().filter(|r: &u32| r.is_power_of_two() && (4..=MAX_RES).contains(r));
+                self.res =
+                    Some(res.ok_or_else(|| {
+                        format!("`{value}` is neither `auto` nor a power of two from 4 to {MAX_RES}")
+                    })?);
+            }
             ("mode", "dda") => self.mode = StepMode::Dda,
             ("mode", "exit") => self.mode = StepMode::Exit,
             ("mode", _) => return Err(format!("`{value}` is neither `dda` nor `exit`")),

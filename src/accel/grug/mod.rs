@@ -23,7 +23,10 @@ use super::{
     block::TriBlock,
     check_indices,
     grid::lattice::Lattice,
-    kdtree::{self, node::KdNode},
+    kdtree::{
+        self,
+        node::{KdNode, MAX_NUMBER},
+    },
     leaves::{ClosestLeaves, OccludedLeaves, pack},
 };
 use crate::{
@@ -34,6 +37,9 @@ use build::{BOUNDS, Built};
 pub use config::{GrugConfig, StepMode};
 pub use table::CellOrder;
 use table::Hash;
+
+/// Most objects: `n` of them allow `S = 16 n + 1024` splits (see [`kdtree::build::room`]), so at most `2 S + 1` nodes and `S + 1` bounds.
+const MAX_OBJECTS: usize = MAX_NUMBER / 82;
 
 /// A built structure over triangles.
 #[derive(Clone, Debug)]
@@ -107,10 +113,11 @@ impl Grug {
 impl Accel for Grug {
     const NAME: &'static str = "grug";
     type Config = GrugConfig;
+    const REFITS: bool = false;
     type RayState = ();
 
     fn build(prims: &Triangles<'_>, config: &GrugConfig) -> Result<Self, BuildError> {
-        check_indices(Self::NAME, prims, kdtree::MAX_OBJECTS)?;
+        check_indices(Self::NAME, prims, MAX_OBJECTS)?;
         let Built { bounds, lattice, hash, table, nodes, items, groups } = build::build(prims, config);
         let blocks = pack(&items, prims);
         let (reach, prim_count) = (kdtree::reach(&bounds), prims.len());

@@ -214,6 +214,7 @@ pub struct KdTree {
 impl Accel for KdTree {
     const NAME: &'static str = "kdtree";
     type Config = KdConfig;
+    const REFITS: bool = false;
     type RayState = ();
 
     fn build(prims: &Triangles<'_>, config: &KdConfig) -> Result<Self, BuildError> {
