@@ -18,7 +18,7 @@ use kinora::{
     glam::{DAffine3, Vec3},
     scene::{ClipId, Scene, import},
     simd::{Simd, SimdLevel, Task, dispatch},
-    world::World,
+    world::{TopKind, World},
 };
 use scenes::{bodies, figure};
 
@@ -84,9 +84,9 @@ fn advance(frames: &mut FrameLoop, frame: u16) -> usize {
 }
 
 /// Allocations of frames 100 to 199 of a loop over `scenes`.
-fn steady_allocations(policy: RebuildPolicy, inside: bool, scenes: &[Arc<Scene>]) -> u64 {
+fn steady_allocations(top: &str, policy: RebuildPolicy, inside: bool, scenes: &[Arc<Scene>]) -> u64 {
     let pool = Arc::new(rayon::ThreadPoolBuilder::new().num_threads(2).build().unwrap());
-    let config = FrameConfig { accel: "bvh2".into(), top: "bvh2".into(), policy, pool: pool.clone() };
+    let config = FrameConfig { accel: "bvh2".into(), top: top.into(), policy, pool: pool.clone() };
     let mut frames = FrameLoop::new(config).unwrap();
     for scene in scenes {
         frames.add(scene.clone(), DAffine3::IDENTITY);
@@ -114,11 +114,13 @@ fn frames_in_steady_state_allocate_nothing() {
         casts.push(vec![Arc::new(man)]);
     }
     for (cast, scenes) in casts.iter().enumerate() {
-        let inside = steady_allocations(RebuildPolicy::Refit, true, scenes);
-        assert_eq!(inside, 0);
+        for top in TopKind::ALL.map(TopKind::name) {
+            let inside = steady_allocations(top, RebuildPolicy::Refit, true, scenes);
+            assert_eq!(inside, 0, "{top}");
+        }
         // From outside of the pool each frame is one job of rayon's queue, which takes a block for every 63.
         if cast == 0 {
-            let outside = steady_allocations(RebuildPolicy::Refit, false, scenes);
+            let outside = steady_allocations("bvh2", RebuildPolicy::Refit, false, scenes);
             assert!(outside <= 4, "{outside}");
         }
     }

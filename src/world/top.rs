@@ -9,7 +9,10 @@ use super::{
     slab::SlabRay,
     top_tree::{STACK, TopNode, TopTree},
 };
-use crate::accel::{SpecError, TravRay};
+use crate::accel::{
+    SpecError, TravRay,
+    events::{EventRay, FlatLists, FlatWalk},
+};
 
 /// Up to this many groups are tested one by one and sorted by entry: a tree over so few costs more than it saves.
 pub(super) const FLAT: usize = 8;
@@ -22,17 +25,20 @@ pub enum TopKind {
     /// A binary tree over the groups' boxes, nearer child first; made anew each frame.
     #[default]
     Bvh2,
+    /// Sorted lists of the boxes' ends on three axes; sorted again each frame from the order of an earlier one.
+    Events,
 }
 
 impl TopKind {
     /// Every kind.
-    pub const ALL: [Self; 2] = [Self::List, Self::Bvh2];
+    pub const ALL: [Self; 3] = [Self::List, Self::Bvh2, Self::Events];
 
-    /// `list` or `bvh2`.
+    /// `list`, `bvh2` or `events`.
     pub fn name(self) -> &'static str {
         match self {
             Self::List => "list",
             Self::Bvh2 => "bvh2",
+            Self::Events => "events",
         }
     }
 }
@@ -52,6 +58,7 @@ impl FromStr for TopKind {
 pub(crate) struct Top {
     kind: TopKind,
     tree: TopTree,
+    lists: FlatLists,
 }
 
 impl Top {
@@ -62,6 +69,19 @@ impl Top {
         if kind == TopKind::Bvh2 && groups.len() > FLAT {
             self.tree.build(groups.iter().map(|g| g.bounds));
         }
+        if kind == TopKind::Events && groups.len() > 1 {
+            self.sort_events(groups);
+        }
+    }
+
+    #[expect(clippy::cast_possible_truncation, reason = "groups are numbered in 31 bits")]
+    fn sort_events(&mut self, groups: &[GroupFrame]) {
+        let bounds = |number: u32| groups[number as usize].bounds;
+        if self.lists.len() == groups.len() {
+            self.lists.refit(bounds);
+        } else {
+            self.lists.rebuild(groups.len() as u32, bounds);
+        }
     }
 
     /// All of at most [`FLAT`] groups, those that `ray` enters first before the others, those that it misses last.
@@ -69,6 +89,9 @@ impl Top {
     /// [`TopKind::List`] keeps them in their own order. What lies past the number of groups means nothing.
     #[inline(always)]
     pub(super) fn order(&self, groups: &[GroupFrame], ray: &TravRay) -> [usize; FLAT] {
+        if self.kind == TopKind::Events && groups.len() > 1 {
+            return self.order_by_events(groups.len(), ray);
+        }
         let (mut order, mut entries) = ([0; FLAT], [0.0; FLAT]);
         let slabs = SlabRay::new(ray);
         let t_far = f64::from(ray.range().t_far);
@@ -87,12 +110,32 @@ impl Top {
         order
     }
 
+    /// As [`Top::order`]: the groups in the order in which `ray` enters them, then the others.
+    fn order_by_events(&self, count: usize, ray: &TravRay) -> [usize; FLAT] {
+        let (mut order, mut met, mut seen) = ([0; FLAT], 0, [false; FLAT]);
+        let mut walk = self.lists.walk(EventRay::new(ray), &mut ());
+        while let Some(number) = walk.next(f64::from(ray.range().t_far), &mut ()) {
+            (order[met], seen[number as usize]) = (number as usize, true);
+            met += 1;
+        }
+        for number in (0..count.min(FLAT)).filter(|&number| !seen[number]) {
+            order[met] = number;
+            met += 1;
+        }
+        order
+    }
+
     /// Begins a walk over the groups that `ray` may hit.
     #[inline(always)]
     pub(crate) fn walk<'a>(&'a self, groups: &'a [GroupFrame], ray: &TravRay) -> Walk<'a> {
         let slabs = SlabRay::new(ray);
+        let stack = [(0.0, 0); STACK];
         let mut walk =
-            Walk { groups, nodes: self.tree.nodes(), slabs, stack: [(0.0, 0); STACK], waiting: 0, next_in_order: 0 };
+            Walk { groups, nodes: self.tree.nodes(), slabs, stack, waiting: 0, next_in_order: 0, lists: None };
+        if self.kind == TopKind::Events && groups.len() > 1 {
+            walk.next_in_order = groups.len();
+            walk.lists = Some(self.lists.walk(EventRay::new(ray), &mut ()));
+        }
         if self.kind == TopKind::Bvh2 {
             walk.next_in_order = groups.len();
             let t_far = f64::from(ray.range().t_far);
@@ -115,12 +158,17 @@ pub(crate) struct Walk<'a> {
     stack: [(f32, u32); STACK],
     waiting: usize,
     next_in_order: usize,
+    /// Of [`TopKind::Events`], which uses nothing else.
+    lists: Option<FlatWalk<'a>>,
 }
 
 impl<'a> Walk<'a> {
     /// The next group that the ray may hit at `t_far` or before.
     #[inline(always)]
     pub(crate) fn next(&mut self, t_far: f64) -> Option<&'a GroupFrame> {
+        if let Some(lists) = &mut self.lists {
+            return self.groups.get(lists.next(t_far, &mut ())? as usize);
+        }
         while self.next_in_order < self.groups.len() {
             let group = &self.groups[self.next_in_order];
             self.next_in_order += 1;
@@ -233,16 +281,50 @@ mod tests {
 
     #[test]
     fn a_bound_that_shrinks_ends_the_walk() {
-        for count in [4_u8, 30] {
+        for (kind, count) in [TopKind::Bvh2, TopKind::Events].into_iter().flat_map(|kind| [(kind, 4_u8), (kind, 30)]) {
             let unit = |i: u8| Aabb { min: Vec3::X * f32::from(i), max: Vec3::X * f32::from(i) + 0.5 };
             let boxes: Vec<_> = (0..count).map(unit).collect();
             let groups = groups(&boxes);
             let mut top = Top::default();
-            top.rebuild(TopKind::Bvh2, &groups);
+            top.rebuild(kind, &groups);
             let mut walk = top.walk(&groups, &TravRay::new(&Ray::new(Vec3::new(-1.0, 0.2, 0.2), Vec3::X)).unwrap());
             let epochs = [f64::INFINITY, f64::INFINITY, 2.9].map(|t| walk.next(t).map(|g| g.layout.topology_epoch));
             assert_eq!(epochs, [Some(0), Some(1), None], "the third begins at 3");
         }
+    }
+
+    #[test]
+    fn events_sorted_again_after_a_motion_visit_what_fresh_ones_do() {
+        let moved = |step: u8| -> Vec<Aabb> {
+            let corner = |i: u8| Vec3::new(f32::from(i * step % 17), f32::from(i * 5 % 11), f32::from(i % 3));
+            (0..40).map(|i| Aabb { min: corner(i), max: corner(i) + 1.5 }).collect()
+        };
+        let mut top = Top::default();
+        for step in [1, 2, 5, 2] {
+            let boxes = moved(step);
+            let groups = groups(&boxes);
+            top.rebuild(TopKind::Events, &groups);
+            for origin in [Vec3::new(-3.0, 1.0, 0.5), Vec3::new(4.0, 4.0, 1.0)] {
+                let ray = Ray::new(origin, Vec3::new(1.0, 0.4, 0.1));
+                let mut walk = top.walk(&groups, &TravRay::new(&ray).unwrap());
+                let again: Vec<_> = std::iter::from_fn(|| walk.next(50.0)).map(|g| g.layout.topology_epoch).collect();
+                assert_eq!(again, visited(TopKind::Events, &boxes, &ray, 50.0));
+                assert!(!again.is_empty());
+            }
+        }
+    }
+
+    #[test]
+    fn few_groups_are_ordered_alike_by_every_structure_but_the_list() {
+        let boxes = [5.0, 1.0, 9.0, 3.0].map(|x| Aabb { min: Vec3::X * x, max: Vec3::X * x + 1.0 });
+        let groups = groups(&boxes);
+        let ray = TravRay::new(&Ray::new(Vec3::new(-1.0, 0.5, 0.5), Vec3::X)).unwrap();
+        let order = |kind| {
+            let mut top = Top::default();
+            top.rebuild(kind, &groups);
+            top.order(&groups, &ray)[..4].to_vec()
+        };
+        assert_eq!(TopKind::ALL.map(order), [vec![0, 1, 2, 3], vec![1, 3, 0, 2], vec![1, 3, 0, 2]]);
     }
 
     proptest! {

@@ -36,6 +36,9 @@ mod tree;
 mod validate;
 mod walk;
 
+pub(crate) use flat::{FlatLists, FlatWalk};
+pub(crate) use ray::EventRay;
+
 pub use boxes::EventBoxes;
 pub use config::{EventsConfig, Form};
 pub use lists::Inversions;

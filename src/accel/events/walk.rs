@@ -79,6 +79,16 @@ fn skip<C: Counter>(list: &[Event], ray: &EventRay, axis: usize, now: f64, count
     cursor(if back { list.len() - passed } else { passed })
 }
 
+/// The number of events that do not belong to empty boxes, when no box is endless upward: empty ones lie above all others.
+#[inline(always)]
+fn finite(list: &[Event]) -> usize {
+    let mut count = list.len();
+    while count > 0 && list[count - 1].value() == f32::INFINITY {
+        count -= 1;
+    }
+    count
+}
+
 /// As a cursor; lists are shorter than 2^32.
 #[inline(always)]
 #[expect(clippy::cast_possible_truncation, reason = "the build checks the lengths of lists")]
@@ -125,7 +135,7 @@ impl<W: RankWord> ListWalk<W> {
         for i in 0..3 {
             let list = view.events[i];
             cursors[i] = if i == axis {
-                if ray.runs_back(i) { cursor(list.len()) } else { 0 }
+                if ray.runs_back(i) { cursor(finite(list)) } else { 0 }
             } else if ray.moves(i) {
                 skip(list, ray, i, now, count)
             } else {
