@@ -214,7 +214,8 @@ pub trait Accel: Sized + Clone + Send + Sync + std::fmt::Debug + 'static {
         count: &mut C,
     ) {
         for i in packet::bits(active) {
-            self.closest::<S, C, K>(prims, &rays[i], &mut best[i], &sinks[i], count);
+            let (ray, best, sink) = (&rays[i], &mut best[i], &sinks[i]);
+            S::call(run::ClosestTask { accel: self, prims, ray, best, sink, count: &mut *count });
         }
     }
 
@@ -228,8 +229,13 @@ pub trait Accel: Sized + Clone + Send + Sync + std::fmt::Debug + 'static {
         sinks: &[K],
         count: &mut C,
     ) -> u32 {
-        packet::bits(active)
-            .fold(0, |blocked, i| blocked | u32::from(self.occluded::<S, C, K>(prims, &rays[i], &sinks[i], count)) << i)
+        let mut blocked = 0;
+        for i in packet::bits(active) {
+            let (ray, sink) = (&rays[i], &sinks[i]);
+            let hit = S::call(run::OccludedTask { accel: self, prims, ray, sink, count: &mut *count });
+            blocked |= u32::from(hit) << i;
+        }
+        blocked
     }
 
     /// Checks every invariant against `prims`.
