@@ -25,7 +25,7 @@ impl SpdScene {
     ///
     /// Round primitives are cut finely enough for the scene's own camera at 720 rows or so, and get smooth normals. Scenes with +Z up are
     /// turned so that +Y is up. Light and material models differ: the lights, which know no falloff, become directional ones through
-    /// the point that the camera looks at (as the package suggests where positions are not at hand); glass lets light through
+    /// the point that the camera looks at (as the package suggests where positions are not at hand), but for those of the lattice; glass lets light through
     /// without bending it; mirrors mirror the sky; the background colour is not used.
     ///
     /// Cost: up to about 10 million triangles at the largest size factors.
@@ -101,24 +101,31 @@ impl SpdScene {
         add_node(scene, SceneNode { local, camera: Some(CameraId(0)), ..named("camera") });
     }
 
+    #[expect(clippy::cast_possible_truncation, reason = "a handful of lights")]
     fn add_lights(&self, scene: &mut Scene) {
-        let focus = if self.kind == SpdKind::Lattice { DVec3::splat(0.5) } else { self.view.at };
         let count = self.lights.len();
-        #[expect(clippy::cast_possible_truncation, reason = "a handful of lights")]
+        let level = (count as f64).sqrt() / (2.0 * count as f64);
+        // The lattice stands between its lights, where parallel light would fall along its rows.
+        let between = self.kind == SpdKind::Lattice;
+        let focus = self.to_y_up(if between { DVec3::splat(0.5) } else { self.view.at });
         for (i, &position) in self.lights.iter().enumerate() {
+            let position = self.to_y_up(position);
+            let distance = position.distance(focus);
+            let (kind, intensity) =
+                if between { (LightKind::Point, level * distance * distance) } else { (LightKind::Directional, level) };
+            let name = format!("light {i}");
             scene.lights.push(Light {
-                name: format!("light {i}"),
+                name: name.clone(),
                 color: Vec3::ONE,
-                intensity: ((count as f64).sqrt() / (2.0 * count as f64)) as f32,
+                intensity: intensity as f32,
                 range: None,
-                kind: LightKind::Directional,
+                kind,
             });
-            let [position, focus] = [position, focus].map(|v| self.to_y_up(v));
-            let back = (position - focus).normalize();
+            let back = (position - focus) / distance;
             let right = back.any_orthonormal_vector();
             let axes = DMat3::from_cols(right, back.cross(right), back);
             let local = LocalTransform::Matrix(DMat4::from_mat3_translation(axes, position));
-            add_node(scene, SceneNode { local, light: Some(LightId(i as u32)), ..named(&format!("light {i}")) });
+            add_node(scene, SceneNode { local, light: Some(LightId(i as u32)), ..named(&name) });
         }
     }
 }

@@ -37,3 +37,18 @@ pub const README: [(SpdKind, [u64; 3]); 7] = [
     (SpdKind::Tetra, [49_788, 46_112, 0]),
     (SpdKind::Tree, [169_836, 1_097_419, 0]),
 ];
+
+/// A uniform grid by Woo's rule with density 10: cells an axis, tests and steps a ray.
+///
+/// # Source
+/// As [`HAVRAN`].
+pub const GRID: [(SpdKind, [u32; 3], [f64; 2]); 8] = [
+    (SpdKind::Balls, [103, 103, 7], [72.54, 12.40]),
+    (SpdKind::Gears, [71, 71, 18], [22.82, 13.83]),
+    (SpdKind::Lattice, [44, 44, 44], [9.26, 10.56]),
+    (SpdKind::Mount, [44, 44, 42], [13.17, 18.43]),
+    (SpdKind::Rings, [44, 43, 44], [23.36, 24.51]),
+    (SpdKind::Teapot, [61, 61, 25], [15.13, 32.50]),
+    (SpdKind::Tetra, [35, 35, 35], [10.01, 15.97]),
+    (SpdKind::Tree, [117, 118, 5], [246.08, 15.45]),
+];

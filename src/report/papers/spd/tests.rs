@@ -1,5 +1,11 @@
 use super::*;
-use crate::scene::spd::SpdKind;
+use crate::{
+    accel::{
+        events::{EventBoxes, EventsConfig, Form},
+        grid::{BoxGrid, GridConfig},
+    },
+    scene::spd::SpdKind,
+};
 
 /// Small pictures of small scenes.
 fn scenes() -> impl Iterator<Item = SpdScene> {
@@ -15,6 +21,12 @@ fn trace<W: Walker>(scene: &SpdScene, solids: &Solids, walker: &W, rays: RaySet)
     Tracer::new(scene, solids, walker, Rules::Readme, (24, rays)).trace()
 }
 
+fn events(solids: &Solids, form: Form) -> EventBoxes {
+    let boxes = solids.boxes();
+    let config = EventsConfig { form, ..EventsConfig::default() };
+    EventBoxes::build(boxes.len(), |i| boxes[i as usize], &config).expect("few boxes")
+}
+
 #[test]
 fn counts_do_not_depend_on_the_structure() {
     for scene in scenes() {
@@ -25,6 +37,15 @@ fn counts_do_not_depend_on_the_structure() {
         assert_eq!(due.primary.rays, 25 * 25);
         assert!(due.primary.hits > 0 && due.shadow.rays > 0, "{} {due:?}", scene.kind.name());
         assert!(naive.tests > 2 * tree.tests && tree.tests > 0, "{}: {tree:?}", scene.kind.name());
+        let grid = BoxGrid::build(solids.boxes(), &GridConfig::default()).expect("few boxes");
+        let (found, grid) = trace(&scene, &solids, &grid, RaySet::All);
+        assert_eq!(found, due, "{}", scene.kind.name());
+        assert!(grid.steps > 0 && grid.tests > 0, "{}: {grid:?}", scene.kind.name());
+        for form in [Form::Flat, Form::Tree] {
+            let (found, walk) = trace(&scene, &solids, &events(&solids, form), RaySet::All);
+            assert_eq!(found, due, "{}, {form:?}", scene.kind.name());
+            assert!(walk.events > 0, "{}: {walk:?}", scene.kind.name());
+        }
     }
 }
 
@@ -36,6 +57,20 @@ fn no_structure_needs_fewer_tests_than_the_least() {
         let (counts, tree) = trace(&scene, &solids, &BoxTree::new(solids.boxes()), RaySet::All);
         assert!(counts.all().hits <= least.nodes, "{}", scene.kind.name());
         assert!(least.nodes <= tree.tests, "{}: {least:?} {tree:?}", scene.kind.name());
+    }
+}
+
+#[test]
+fn event_lists_make_the_least_tests() {
+    for mut scene in scenes() {
+        // Rays to lights stop at any hit, so the least for them depends on luck.
+        scene.lights.clear();
+        let solids = Solids::new(&scene);
+        let (_, least) = trace(&scene, &solids, &LeastTests::new(solids.boxes()), RaySet::All);
+        for form in [Form::Flat, Form::Tree] {
+            let (_, walk) = trace(&scene, &solids, &events(&solids, form), RaySet::All);
+            assert_eq!(walk.tests, least.nodes, "{}, {form:?}", scene.kind.name());
+        }
     }
 }
 

@@ -115,7 +115,7 @@ impl<'a, W: Walker> Tracer<'a, W> {
         let walked = TravRay::new(ray)?;
         let solid_ray = SolidRay::from(ray);
         let mut nearest = Nearest { solids: self.solids, ray: solid_ray, best: None, tests: 0 };
-        self.walker.walk(&walked, state, &mut nearest, recorder);
+        self.walker.walk_on(&walked, state, &mut nearest, recorder);
         let (best, tests) = (nearest.best, nearest.tests);
         (0..tests).for_each(|_| recorder.test());
         let (object, hit) = best?;
@@ -164,7 +164,7 @@ impl<'a, W: Walker> Tracer<'a, W> {
         row.counts.shadow.rays += 1;
         let Some(walked) = TravRay::new(&ray) else { return };
         let mut any = Any { solids: self.solids, ray: SolidRay::from(&ray), found: false, tests: 0 };
-        self.walker.walk(&walked, &mut state.clone(), &mut any, row.recorder);
+        self.walker.walk_at(&walked, state, &mut any, row.recorder);
         let (found, tests) = (any.found, any.tests);
         (0..tests).for_each(|_| row.recorder.test());
         row.counts.shadow.hits += u64::from(found);

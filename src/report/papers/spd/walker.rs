@@ -3,7 +3,11 @@
 use glam::Vec3;
 
 use crate::{
-    accel::{Counter, TravRay, Visitor},
+    accel::{
+        Counter, TravRay, Visitor,
+        events::{EventBoxes, EventState},
+        grid::BoxGrid,
+    },
     geom::Aabb,
     world::{STACK, SlabRay, TopTree},
 };
@@ -16,9 +20,14 @@ pub trait Walker: Sync {
     /// The state of rays that start at `point`; made once for an image's eye.
     fn seat(&self, point: Vec3) -> Self::State;
 
-    /// Shows `visitor` every object that can change its answer, until it ends the walk. `state` is that of the ray's origin, and
-    /// becomes that of the point where the ray ends: the hit at [`Visitor::t_limit`], if there is one.
-    fn walk<V: Visitor, C: Counter>(&self, ray: &TravRay, state: &mut Self::State, visitor: &mut V, count: &mut C);
+    /// Shows `visitor` every object that can change its answer, until it ends the walk. `state` is that of the ray's origin.
+    fn walk_at<V: Visitor, C: Counter>(&self, ray: &TravRay, state: &Self::State, visitor: &mut V, count: &mut C);
+
+    /// As [`Walker::walk_at`]; `state` becomes that of the point where the ray ends, the hit at [`Visitor::t_limit`], for rays that
+    /// start there.
+    fn walk_on<V: Visitor, C: Counter>(&self, ray: &TravRay, state: &mut Self::State, visitor: &mut V, count: &mut C) {
+        self.walk_at(ray, state, visitor, count);
+    }
 }
 
 /// Every object for every ray.
@@ -39,7 +48,7 @@ impl Walker for Naive {
 
     fn seat(&self, _point: Vec3) {}
 
-    fn walk<V: Visitor, C: Counter>(&self, _ray: &TravRay, _state: &mut (), visitor: &mut V, _count: &mut C) {
+    fn walk_at<V: Visitor, C: Counter>(&self, _ray: &TravRay, _state: &(), visitor: &mut V, _count: &mut C) {
         for object in 0..self.objects {
             if visitor.visit(object) {
                 return;
@@ -68,7 +77,7 @@ impl Walker for BoxTree {
 
     fn seat(&self, _point: Vec3) {}
 
-    fn walk<V: Visitor, C: Counter>(&self, ray: &TravRay, _state: &mut (), visitor: &mut V, count: &mut C) {
+    fn walk_at<V: Visitor, C: Counter>(&self, ray: &TravRay, _state: &(), visitor: &mut V, count: &mut C) {
         let nodes = self.tree.nodes();
         let slabs = SlabRay::new(ray);
         let Some(root) = nodes.first() else { return };
@@ -101,6 +110,34 @@ impl Walker for BoxTree {
                 stack.swap(first, first + 1);
             }
         }
+    }
+}
+
+/// Sorted event lists, flat or hierarchical: cursors go from a ray to those that it spawns.
+impl Walker for EventBoxes {
+    type State = EventState;
+
+    fn seat(&self, point: Vec3) -> EventState {
+        self.state_at(point)
+    }
+
+    fn walk_at<V: Visitor, C: Counter>(&self, ray: &TravRay, state: &EventState, visitor: &mut V, count: &mut C) {
+        Self::walk_at(self, ray, state, visitor, count);
+    }
+
+    fn walk_on<V: Visitor, C: Counter>(&self, ray: &TravRay, state: &mut EventState, visitor: &mut V, count: &mut C) {
+        Self::walk_on(self, ray, state, visitor, count);
+    }
+}
+
+/// A uniform grid: an object is tested in every cell that it is met in.
+impl Walker for BoxGrid {
+    type State = ();
+
+    fn seat(&self, _point: Vec3) {}
+
+    fn walk_at<V: Visitor, C: Counter>(&self, ray: &TravRay, _state: &(), visitor: &mut V, count: &mut C) {
+        self.walk(ray, visitor, count);
     }
 }
 
@@ -157,14 +194,14 @@ impl Walker for LeastTests {
 
     fn seat(&self, _point: Vec3) {}
 
-    fn walk<V: Visitor, C: Counter>(&self, ray: &TravRay, _state: &mut (), visitor: &mut V, count: &mut C) {
+    fn walk_at<V: Visitor, C: Counter>(&self, ray: &TravRay, _state: &(), visitor: &mut V, count: &mut C) {
         let mut watch = Watch { inner: visitor, ended: false };
-        self.tree.walk(ray, &mut (), &mut watch, &mut ());
+        self.tree.walk_at(ray, &(), &mut watch, &mut ());
         if watch.ended {
             count.node();
         } else {
             let limit = visitor.t_limit();
-            self.tree.walk(ray, &mut (), &mut Tick { limit, count }, &mut ());
+            self.tree.walk_at(ray, &(), &mut Tick { limit, count }, &mut ());
         }
     }
 }
