@@ -26,7 +26,7 @@ use crate::{
     geom::{Aabb, Triangles},
     simd::Simd,
 };
-use node::{MAX_BLOCKS, Pair};
+use node::{Link, MAX_BLOCKS, Pair};
 use refit::Swept;
 
 /// Tells topologies apart: structures with equal numbers differ in boxes and corners only.
@@ -105,6 +105,16 @@ impl Bvh2 {
     fn cost(&self) -> f64 {
         let Swept { cost, own_area } = self.swept;
         if own_area > 0.0 { cost / own_area } else { 0.0 }
+    }
+
+    /// Blocks of a leaf that has some; its triangles are counted.
+    #[inline(always)]
+    fn leaf_blocks<C: Counter>(&self, link: Link, count: &mut C) -> &[TriBlock] {
+        let blocks = &self.blocks[link.leaf_blocks()];
+        for block in blocks {
+            block.prims().for_each(|_| count.prim());
+        }
+        blocks
     }
 
     fn depth(&self) -> usize {

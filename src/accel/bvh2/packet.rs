@@ -130,11 +130,12 @@ impl Bvh2 {
         let (mut link, mut mask) = (Link::inner(0), active);
         loop {
             if link.is_leaf() {
-                for block in &self.blocks[link.leaf_blocks()] {
+                for block in self.leaf_blocks(link, count) {
                     block.closest_packet::<S, C, K>(rays, &mut packet, mask, best, sinks, count);
                 }
                 node.limit = S::F::load(&packet.t_cull);
             } else {
+                count.node();
                 count.node();
                 if let Some(next) = descend(&node, &mut stack, &self.pairs[link.pair()], mask) {
                     (link, mask) = next;
@@ -194,13 +195,14 @@ impl Bvh2 {
         let (mut link, mut mask) = (Link::inner(0), active);
         loop {
             if link.is_leaf() {
-                for block in &self.blocks[link.leaf_blocks()] {
+                for block in self.leaf_blocks(link, count) {
                     open &= !block.occluded_packet::<S, C, K>(rays, &packet, mask & open, sinks, count);
                 }
                 if open == 0 {
                     return active;
                 }
             } else {
+                count.node();
                 count.node();
                 if let Some(next) = descend(&node, &mut stack, &self.pairs[link.pair()], mask & open) {
                     (link, mask) = next;

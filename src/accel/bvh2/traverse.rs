@@ -233,11 +233,12 @@ impl Bvh2 {
         let mut link = Link::inner(0);
         loop {
             if link.is_leaf() {
-                for block in &self.blocks[link.leaf_blocks()] {
+                for block in self.leaf_blocks(link, count) {
                     block.closest::<S, C, K>(ray, &block_ray, best, sink, count);
                 }
                 test.limit(best);
             } else {
+                count.node();
                 count.node();
                 let pair = &self.pairs[link.pair()];
                 let (hits, entries) = test.test(pair);
@@ -285,12 +286,13 @@ impl Bvh2 {
         let mut link = Link::inner(0);
         loop {
             if link.is_leaf() {
-                for block in &self.blocks[link.leaf_blocks()] {
+                for block in self.leaf_blocks(link, count) {
                     if block.occluded::<S, C, K>(ray, &block_ray, sink, count) {
                         return true;
                     }
                 }
             } else {
+                count.node();
                 count.node();
                 let pair = &self.pairs[link.pair()];
                 let (hits, entries) = test.test(pair);
