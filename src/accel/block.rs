@@ -81,6 +81,17 @@ impl TriBlock {
         self.corners.map(|corner| corner.map(|axis| S::widen(S::F4::load(&axis))))
     }
 
+    /// The boxes of the four triangles: lower and upper planes of each axis. Those of lanes that are never hit are points at 0.
+    #[inline(always)]
+    pub(super) fn boxes<S: Simd>(&self) -> [[S::F4; 2]; 3] {
+        let [a, b, c] = &self.corners;
+        let axis = |i: usize| {
+            let (a, b, c) = (S::F4::load(&a[i]), S::F4::load(&b[i]), S::F4::load(&c[i]));
+            [a.min(b).min(c), a.max(b).max(c)]
+        };
+        [axis(0), axis(1), axis(2)]
+    }
+
     /// Takes the corners from `prims` and returns the box around them.
     #[inline(always)]
     pub(super) fn refit(&mut self, prims: &Triangles<'_>) -> BlockBounds {

@@ -154,19 +154,19 @@ impl Ssh {
         if self.spans.is_empty() { 1 } else { usize::from(self.spans[first]) }
     }
 
-    /// Blocks of a leaf; its triangles are counted.
+    /// Blocks of a leaf, and which lanes are its own; its triangles are counted.
     #[inline(always)]
-    fn leaf_blocks<C: Counter>(&self, word: Word, count: &mut C) -> &[TriBlock] {
+    fn leaf_blocks<C: Counter>(&self, word: Word, count: &mut C) -> (&[TriBlock], u32) {
+        let place = word.index();
         if self.packed {
             count.prim();
-            return std::slice::from_ref(&self.blocks[word.index() / sah::BLOCK]);
+            return (std::slice::from_ref(&self.blocks[place / sah::BLOCK]), 1 << (place % sah::BLOCK));
         }
-        let first = word.index();
-        let blocks = &self.blocks[first..first + self.span(first)];
+        let blocks = &self.blocks[place..place + self.span(place)];
         for block in blocks {
             block.prims().for_each(|_| count.prim());
         }
-        blocks
+        (blocks, (1 << sah::BLOCK) - 1)
     }
 
     /// Takes new positions into the tree; `choose` chooses the sides anew.

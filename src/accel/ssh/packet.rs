@@ -8,6 +8,7 @@ use super::{
 use crate::{
     accel::{
         Accel, Closest, Counter, HitSink, TravRay,
+        block::{NO_PRIM, TriBlock},
         packet::{PACKET, PacketRays, bits},
         query::{GROW, SHRINK},
         topology::MAX_DEPTH,
@@ -85,6 +86,16 @@ impl<S: Simd> PacketSlabs<S> {
         self.cut(node.plane, node.word.side(), segments)
     }
 
+    /// Rays that may meet the box around the triangles of a block.
+    #[inline(always)]
+    fn meeting(&self, block: &TriBlock, lanes: u32, mut segments: Segments<S>) -> u32 {
+        let planes = box_of::<S>(block, lanes);
+        for side in Side::ALL {
+            segments = self.cut(planes[side.axis()][usize::from(side.is_upper())], side, segments);
+        }
+        segments.open()
+    }
+
     #[inline(always)]
     fn clipped(&self, bounds: &Aabb) -> Segments<S> {
         let mut segments = Segments { near: self.t_near, far: self.limit };
@@ -93,6 +104,28 @@ impl<S: Simd> PacketSlabs<S> {
         }
         segments
     }
+}
+
+/// Lower and upper planes of the box around the triangles of a block in some lanes.
+#[inline(always)]
+fn box_of<S: Simd>(block: &TriBlock, lanes: u32) -> [[f32; 2]; 3] {
+    let planes = block.boxes::<S>();
+    let mut rows = [[[0.0; 4]; 2]; 3];
+    for axis in 0..3 {
+        planes[axis][0].store(&mut rows[axis][0]);
+        planes[axis][1].store(&mut rows[axis][1]);
+    }
+    let mut out = [[f32::INFINITY, f32::NEG_INFINITY]; 3];
+    for lane in 0..4 {
+        if (lanes >> lane) & 1 == 0 || block.prim(lane) == NO_PRIM {
+            continue;
+        }
+        for axis in 0..3 {
+            let [low, high] = [rows[axis][0][lane], rows[axis][1][lane]];
+            out[axis] = [if low < out[axis][0] { low } else { out[axis][0] }, if high > out[axis][1] { high } else { out[axis][1] }];
+        }
+    }
+    out
 }
 
 /// A node to visit: which rays meet it, and their parts inside.
@@ -174,8 +207,12 @@ impl Ssh {
         let mut stack = Stack::<S>::new();
         loop {
             if entry.word.is_leaf() {
-                for block in self.leaf_blocks(entry.word, count) {
-                    block.closest_packet::<S, C, K>(rays, &mut packet, entry.mask, best, sinks, count);
+                let (blocks, lanes) = self.leaf_blocks(entry.word, count);
+                for block in blocks {
+                    let mask = entry.mask & slabs.meeting(block, lanes, entry.segments);
+                    if mask != 0 {
+                        block.closest_packet::<S, C, K>(rays, &mut packet, mask, best, sinks, count);
+                    }
                 }
                 slabs.limit = S::F::load(&packet.t_cull);
             } else if let Some(next) = self.descend_together(&slabs, &mut stack, &entry, count) {
@@ -244,8 +281,12 @@ impl Ssh {
         let mut open = active;
         loop {
             if entry.word.is_leaf() {
-                for block in self.leaf_blocks(entry.word, count) {
-                    open &= !block.occluded_packet::<S, C, K>(rays, &packet, entry.mask & open, sinks, count);
+                let (blocks, lanes) = self.leaf_blocks(entry.word, count);
+                for block in blocks {
+                    let mask = entry.mask & open & slabs.meeting(block, lanes, entry.segments);
+                    if mask != 0 {
+                        open &= !block.occluded_packet::<S, C, K>(rays, &packet, mask, sinks, count);
+                    }
                 }
                 if open == 0 {
                     return active;

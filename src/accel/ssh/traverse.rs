@@ -7,12 +7,12 @@ use super::{
 use crate::{
     accel::{
         Closest, Counter, HitSink, TravRay,
-        block::BlockRay,
+        block::{BlockRay, TriBlock},
         query::{GROW, ORDINARY_MAX, SHRINK},
         topology::MAX_DEPTH,
     },
     geom::Aabb,
-    simd::{Simd, branch_barrier},
+    simd::{Lanes, Simd, branch_barrier},
 };
 
 /// Absolute slack of the f32 node test: above every underflow it may meet.
@@ -35,6 +35,8 @@ pub(super) trait SlabTest: Copy {
     fn limit(&mut self, best: &Closest);
     /// The segment up to the limit.
     fn limited(&self, segment: [Self::T; 2]) -> [Self::T; 2];
+    /// False when the ray surely misses the boxes of all triangles of a block, or of one lane, within the segment.
+    fn may_meet<S: Simd>(&self, block: &TriBlock, lanes: u32, segment: [Self::T; 2]) -> bool;
     /// True when the ray runs downward along an axis.
     fn is_backward(&self, axis: usize) -> bool;
 
@@ -138,6 +140,23 @@ impl SlabTest for FastSlabs {
         [near, if self.limit < far { self.limit } else { far }]
     }
 
+    /// The triangles' boxes cost a third of the exact test, and nodes of one plane lead to leaves that most rays miss.
+    #[inline(always)]
+    fn may_meet<S: Simd>(&self, block: &TriBlock, lanes: u32, [near, far]: [f32; 2]) -> bool {
+        let (mut near, mut far) = (S::F4::splat(near), S::F4::splat(far));
+        let planes = block.boxes::<S>();
+        for axis in 0..3 {
+            let backward = self.backward[axis];
+            let (entry, exit) = (&self.rows[axis + 4 * usize::from(backward)], &self.rows[axis + 4 * usize::from(!backward)]);
+            let [low, high] = planes[axis];
+            let (first, second) = if backward { (high, low) } else { (low, high) };
+            let origin = S::F4::splat(entry.origin);
+            near = ((first - origin) * S::F4::splat(entry.entry)).max(near);
+            far = ((second - origin) * S::F4::splat(exit.exit)).min(far);
+        }
+        (near - far).le(S::F4::splat(SLACK)) & lanes != 0
+    }
+
     #[inline(always)]
     fn is_backward(&self, axis: usize) -> bool {
         self.backward[axis]
@@ -196,6 +215,10 @@ impl SlabTest for WideSlabs {
 
     fn limited(&self, [near, far]: [f64; 2]) -> [f64; 2] {
         [near, far.min(self.limit)]
+    }
+
+    fn may_meet<S: Simd>(&self, _block: &TriBlock, _lanes: u32, _segment: [f64; 2]) -> bool {
+        true
     }
 
     fn is_backward(&self, axis: usize) -> bool {
@@ -284,7 +307,11 @@ impl Ssh {
         let mut word = self.root;
         loop {
             if word.is_leaf() {
-                for block in self.leaf_blocks(word, count) {
+                let (blocks, lanes) = self.leaf_blocks(word, count);
+                for block in blocks {
+                    if !test.may_meet::<S>(block, lanes, segment) {
+                        continue;
+                    }
                     block.closest::<S, C, K>(ray, &block_ray, best, sink, count);
                 }
                 test.limit(best);
@@ -320,8 +347,11 @@ impl Ssh {
         let mut word = self.root;
         loop {
             if word.is_leaf() {
-                for block in self.leaf_blocks(word, count) {
-                    if block.occluded::<S, C, K>(ray, &block_ray, sink, count) {
+                let (blocks, lanes) = self.leaf_blocks(word, count);
+                for block in blocks {
+                    if test.may_meet::<S>(block, lanes, segment)
+                        && block.occluded::<S, C, K>(ray, &block_ray, sink, count)
+                    {
                         return true;
                     }
                 }

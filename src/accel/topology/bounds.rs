@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use super::CHUNK;
 use crate::geom::{PrimId, Triangles};
 
-/// A triangle's box and number, 32 bytes: the number is the bits of `min`'s fourth lane.
+/// A triangle's box and number, 32 bytes: the number is in the bits of `min`'s fourth lane.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct PrimRef {
     min: Vec4,
@@ -15,15 +15,21 @@ pub(super) struct PrimRef {
 
 const _: () = assert!(size_of::<PrimRef>() == 32);
 
+/// Set in the bits of the number, so that they are those of a normal float: arithmetic takes the fourth lane along, and is slow for others.
+const NORMAL: u32 = 1 << 30;
+
+/// Numbers are below this.
+pub(super) const MAX_NUMBER: u32 = 1 << 28;
+
 impl PrimRef {
     pub(super) fn new(prims: &Triangles<'_>, id: u32) -> Self {
         let aabb = prims.finite_aabb(PrimId(id));
-        Self { min: aabb.min.extend(f32::from_bits(id)), max: aabb.max.extend(0.0) }
+        Self { min: aabb.min.extend(f32::from_bits(NORMAL | id)), max: aabb.max.extend(0.0) }
     }
 
     #[inline(always)]
     pub(super) fn id(&self) -> u32 {
-        self.min.w.to_bits()
+        self.min.w.to_bits() & !NORMAL
     }
 
     #[inline(always)]

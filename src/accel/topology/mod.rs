@@ -116,9 +116,13 @@ pub(super) struct Topology {
     pub(super) prims: Vec<u32>,
 }
 
-/// Builds the topology over all triangles, whose number must fit into u32.
-#[expect(clippy::cast_possible_truncation, reason = "checked by the caller")]
+/// Builds the topology over all triangles.
+///
+/// # Panics
+/// With 2^28 triangles or more: structures have lower limits.
+#[expect(clippy::cast_possible_truncation, reason = "checked first")]
 pub(super) fn build(prims: &Triangles<'_>, settings: &Settings) -> Topology {
+    assert!(prims.len() <= bounds::MAX_NUMBER as usize, "more triangles than references can number");
     let numbers = (0..prims.len() as u32).into_par_iter().with_min_len(CHUNK);
     let mut refs: Vec<PrimRef> = numbers.map(|id| PrimRef::new(prims, id)).collect();
     let mut order = vec![0; refs.len()];
