@@ -20,7 +20,8 @@ pub(super) const NO_PRIM: u32 = u32::MAX;
 
 /// Four triangles: `corners[corner][axis][lane]`.
 ///
-/// Lanes without a triangle, and triangles with a corner that is not finite, have all corners at 0: no area, no hit.
+/// Lanes without a triangle, and triangles with a corner that is not finite, have all corners at one point: no area, no hit. It
+/// is a corner of another triangle of the block, so that it widens no box; 0 where there is none.
 #[repr(C, align(32))]
 #[derive(Clone, Copy, Debug)]
 pub(super) struct TriBlock {
@@ -81,7 +82,7 @@ impl TriBlock {
         self.corners.map(|corner| corner.map(|axis| S::widen(S::F4::load(&axis))))
     }
 
-    /// The boxes of the four triangles: lower and upper planes of each axis. Those of lanes that are never hit are points at 0.
+    /// The boxes of the four triangles: lower and upper planes of each axis. Those of lanes that are never hit are points.
     #[inline(always)]
     pub(super) fn boxes<S: Simd>(&self) -> [[S::F4; 2]; 3] {
         let [a, b, c] = &self.corners;
@@ -99,6 +100,7 @@ impl TriBlock {
         let mut max = Vec3A::NEG_INFINITY;
         let mut own_area = 0.0;
         let mut rows = [[Vec4::ZERO; 4]; 3];
+        let mut left = 15_u32;
         for (lane, &prim) in self.prims.iter().enumerate() {
             if prim == NO_PRIM {
                 continue;
@@ -112,9 +114,16 @@ impl TriBlock {
                 max = max.max(high);
                 let e = high - low;
                 own_area += f64::from(e.x * e.y + e.y * e.z + e.z * e.x);
+                left &= !(1 << lane);
                 rows[0][lane] = a.extend(0.0);
                 rows[1][lane] = b.extend(0.0);
                 rows[2][lane] = c.extend(0.0);
+            }
+        }
+        if left != 0 {
+            let point = rows[0][(!left).trailing_zeros() as usize & 3];
+            for lane in (0..4).filter(|lane| left >> lane & 1 == 1) {
+                rows.iter_mut().for_each(|row| row[lane] = point);
             }
         }
         for (corner, [a, b, c, d]) in self.corners.iter_mut().zip(rows) {

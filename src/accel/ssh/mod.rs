@@ -154,19 +154,19 @@ impl Ssh {
         if self.spans.is_empty() { 1 } else { usize::from(self.spans[first]) }
     }
 
-    /// Blocks of a leaf, and which lanes are its own; its triangles are counted.
+    /// Blocks of a leaf, and which lane is its own where leaves share blocks; its triangles are counted.
     #[inline(always)]
-    fn leaf_blocks<C: Counter>(&self, word: Word, count: &mut C) -> (&[TriBlock], u32) {
+    fn leaf_blocks<C: Counter>(&self, word: Word, count: &mut C) -> (&[TriBlock], Option<usize>) {
         let place = word.index();
         if self.packed {
             count.prim();
-            return (std::slice::from_ref(&self.blocks[place / sah::BLOCK]), 1 << (place % sah::BLOCK));
+            return (std::slice::from_ref(&self.blocks[place / sah::BLOCK]), Some(place % sah::BLOCK));
         }
         let blocks = &self.blocks[place..place + self.span(place)];
         for block in blocks {
             block.prims().for_each(|_| count.prim());
         }
-        (blocks, (1 << sah::BLOCK) - 1)
+        (blocks, None)
     }
 
     /// Takes new positions into the tree; `choose` chooses the sides anew.
@@ -352,3 +352,6 @@ impl Accel for Ssh {
         if self.fresh_cost > 0.0 { self.cost() / self.fresh_cost } else { 1.0 }
     }
 }
+
+#[cfg(test)]
+mod tests;

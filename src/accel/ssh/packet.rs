@@ -3,18 +3,18 @@ use arrayvec::ArrayVec;
 use super::{
     Ssh,
     node::{Node, Side, Word},
-    traverse::SLACK,
+    traverse::{SLACK, predicted},
 };
 use crate::{
     accel::{
         Accel, Closest, Counter, HitSink, TravRay,
-        block::{NO_PRIM, TriBlock},
+        block::TriBlock,
         packet::{PACKET, PacketRays, bits},
         query::{GROW, SHRINK},
         topology::MAX_DEPTH,
     },
     geom::{Aabb, Triangles},
-    simd::{Lanes, Simd},
+    simd::{Halves, Lanes, Simd},
 };
 
 /// Groups of fewer rays of common direction signs are walked one by one.
@@ -60,9 +60,11 @@ impl<S: Simd> PacketSlabs<S> {
             t_near: S::F::load(&packet.t_near32),
             limit: S::F::load(&packet.t_cull),
         };
+        let one = S::F::splat(1.0);
+        // As `TravRay::new`.
+        let inv = [one / row(&packet.dir32, 0), one / row(&packet.dir32, 1), one / row(&packet.dir32, 2)];
         for side in Side::ALL {
-            // As `TravRay::new`.
-            let inv = S::F::splat(1.0) / row(&packet.dir32, side.axis());
+            let inv = inv[side.axis()];
             if side.is_upper() == backward[side.axis()] {
                 out.entry[side.row()] = inv * S::F::splat(SHRINK);
             } else {
@@ -86,10 +88,10 @@ impl<S: Simd> PacketSlabs<S> {
         self.cut(node.plane, node.word.side(), segments)
     }
 
-    /// Rays that may meet the box around the triangles of a block.
+    /// Rays that may meet the box around the triangles of a block, or around one of them.
     #[inline(always)]
-    fn meeting(&self, block: &TriBlock, lanes: u32, mut segments: Segments<S>) -> u32 {
-        let planes = box_of::<S>(block, lanes);
+    fn meeting(&self, block: &TriBlock, lane: Option<usize>, mut segments: Segments<S>) -> u32 {
+        let planes = box_of::<S>(block, lane);
         for side in Side::ALL {
             segments = self.cut(planes[side.axis()][usize::from(side.is_upper())], side, segments);
         }
@@ -106,24 +108,35 @@ impl<S: Simd> PacketSlabs<S> {
     }
 }
 
-/// Lower and upper planes of the box around the triangles of a block in some lanes.
+/// The least and the greatest of four lanes.
 #[inline(always)]
-fn box_of<S: Simd>(block: &TriBlock, lanes: u32) -> [[f32; 2]; 3] {
+fn least<S: Simd>(lanes: S::F4) -> f32 {
+    let halves = lanes.min(lanes.high_half());
+    let (a, b) = (halves.first(), halves.second());
+    if a < b { a } else { b }
+}
+
+#[inline(always)]
+fn greatest<S: Simd>(lanes: S::F4) -> f32 {
+    let halves = lanes.max(lanes.high_half());
+    let (a, b) = (halves.first(), halves.second());
+    if a > b { a } else { b }
+}
+
+/// Lower and upper planes of the box around the triangles of a block, or around one of them.
+#[inline(always)]
+fn box_of<S: Simd>(block: &TriBlock, lane: Option<usize>) -> [[f32; 2]; 3] {
     let planes = block.boxes::<S>();
-    let mut rows = [[[0.0; 4]; 2]; 3];
-    for axis in 0..3 {
-        planes[axis][0].store(&mut rows[axis][0]);
-        planes[axis][1].store(&mut rows[axis][1]);
-    }
-    let mut out = [[f32::INFINITY, f32::NEG_INFINITY]; 3];
-    for lane in 0..4 {
-        if (lanes >> lane) & 1 == 0 || block.prim(lane) == NO_PRIM {
-            continue;
-        }
-        for axis in 0..3 {
-            let [low, high] = [rows[axis][0][lane], rows[axis][1][lane]];
-            out[axis] = [if low < out[axis][0] { low } else { out[axis][0] }, if high > out[axis][1] { high } else { out[axis][1] }];
-        }
+    let mut out = [[0.0; 2]; 3];
+    for (out, [low, high]) in out.iter_mut().zip(planes) {
+        *out = if let Some(lane) = lane {
+            let mut rows = [[0.0; 4]; 2];
+            low.store(&mut rows[0]);
+            high.store(&mut rows[1]);
+            [rows[0][lane & 3], rows[1][lane & 3]]
+        } else {
+            [least::<S>(low), greatest::<S>(high)]
+        };
     }
     out
 }
@@ -199,34 +212,51 @@ impl Ssh {
             packet.set_limit(i, best);
         }
         let mut slabs = PacketSlabs::<S>::new(&packet, backward);
-        let segments = slabs.clipped(&self.bounds);
-        let mut entry = Entry { word: self.root, mask: active & segments.open(), segments };
-        if entry.mask == 0 {
+        let mut segments = slabs.clipped(&self.bounds);
+        let (mut word, mut mask) = (self.root, active & segments.open());
+        if mask == 0 {
             return;
         }
         let mut stack = Stack::<S>::new();
         loop {
-            if entry.word.is_leaf() {
-                let (blocks, lanes) = self.leaf_blocks(entry.word, count);
+            if word.is_leaf() {
+                let (blocks, lane) = self.leaf_blocks(word, count);
                 for block in blocks {
-                    let mask = entry.mask & slabs.meeting(block, lanes, entry.segments);
+                    let mask = mask & slabs.meeting(block, lane, segments);
                     if mask != 0 {
                         block.closest_packet::<S, C, K>(rays, &mut packet, mask, best, sinks, count);
                     }
                 }
                 slabs.limit = S::F::load(&packet.t_cull);
-            } else if let Some(next) = self.descend_together(&slabs, &mut stack, &entry, count) {
-                entry = next;
-                continue;
-            }
-            entry = loop {
-                let Some(mut entry) = stack.pop() else { return };
-                entry.segments.far = slabs.limit.min(entry.segments.far);
-                entry.mask &= entry.segments.open();
-                if entry.mask != 0 {
-                    break entry;
+            } else {
+                count.node();
+                count.node();
+                let nodes = &self.pairs[word.index()].0;
+                let nearer = usize::from(slabs.backward[word.order()]);
+                let (first, second) = (&nodes[nearer], &nodes[1 - nearer]);
+                let (segments1, segments2) = (slabs.cut_by(first, segments), slabs.cut_by(second, segments));
+                let (mask1, mask2) = (segments1.open() & mask, segments2.open() & mask);
+                if mask1 != 0 {
+                    if mask2 != 0 {
+                        stack.push(Entry { word: second.word, mask: mask2, segments: segments2 });
+                    }
+                    (word, mask, segments) = (predicted(first.word), mask1, segments1);
+                    continue;
                 }
-            };
+                if mask2 != 0 {
+                    (word, mask, segments) = (predicted(second.word), mask2, segments2);
+                    continue;
+                }
+            }
+            loop {
+                let Some(entry) = stack.pop() else { return };
+                segments = Segments { near: entry.segments.near, far: slabs.limit.min(entry.segments.far) };
+                mask = entry.mask & segments.open();
+                if mask != 0 {
+                    word = entry.word;
+                    break;
+                }
+            }
         }
     }
 
@@ -272,18 +302,18 @@ impl Ssh {
     ) -> u32 {
         let packet = PacketRays::new(rays);
         let slabs = PacketSlabs::<S>::new(&packet, backward);
-        let segments = slabs.clipped(&self.bounds);
-        let mut entry = Entry { word: self.root, mask: active & segments.open(), segments };
-        if entry.mask == 0 {
+        let mut segments = slabs.clipped(&self.bounds);
+        let (mut word, mut mask) = (self.root, active & segments.open());
+        if mask == 0 {
             return 0;
         }
         let mut stack = Stack::<S>::new();
         let mut open = active;
         loop {
-            if entry.word.is_leaf() {
-                let (blocks, lanes) = self.leaf_blocks(entry.word, count);
+            if word.is_leaf() {
+                let (blocks, lane) = self.leaf_blocks(word, count);
                 for block in blocks {
-                    let mask = entry.mask & open & slabs.meeting(block, lanes, entry.segments);
+                    let mask = mask & open & slabs.meeting(block, lane, segments);
                     if mask != 0 {
                         open &= !block.occluded_packet::<S, C, K>(rays, &packet, mask, sinks, count);
                     }
@@ -291,43 +321,47 @@ impl Ssh {
                 if open == 0 {
                     return active;
                 }
-            } else if let Some(next) = self.descend_together(&slabs, &mut stack, &entry, count) {
-                entry = next;
-                continue;
-            }
-            entry = loop {
-                let Some(mut entry) = stack.pop() else { return active & !open };
-                entry.mask &= open;
-                if entry.mask != 0 {
-                    break entry;
+            } else {
+                count.node();
+                count.node();
+                let nodes = &self.pairs[word.index()].0;
+                let nearer = usize::from(slabs.backward[word.order()]);
+                let (first, second) = (&nodes[nearer], &nodes[1 - nearer]);
+                let (segments1, segments2) = (slabs.cut_by(first, segments), slabs.cut_by(second, segments));
+                let (mask1, mask2) = (segments1.open() & mask, segments2.open() & mask);
+                if mask1 != 0 {
+                    if mask2 != 0 {
+                        stack.push(Entry { word: second.word, mask: mask2, segments: segments2 });
+                    }
+                    (word, mask, segments) = (predicted(first.word), mask1, segments1);
+                    continue;
                 }
-            };
+                if mask2 != 0 {
+                    (word, mask, segments) = (predicted(second.word), mask2, segments2);
+                    continue;
+                }
+            }
+            loop {
+                let Some(entry) = stack.pop() else { return active & !open };
+                mask = entry.mask & open;
+                if mask != 0 {
+                    (word, segments) = (entry.word, entry.segments);
+                    break;
+                }
+            }
         }
     }
+}
 
-    /// Cuts the segments with both children; the one that comes first along the order axis is next, the other goes to the stack.
-    #[inline(always)]
-    fn descend_together<S: Simd, C: Counter>(
-        &self,
-        slabs: &PacketSlabs<S>,
-        stack: &mut Stack<S>,
-        entry: &Entry<S>,
-        count: &mut C,
-    ) -> Option<Entry<S>> {
-        count.node();
-        count.node();
-        let nodes = &self.pairs[entry.word.index()].0;
-        let segments = [slabs.cut_by(&nodes[0], entry.segments), slabs.cut_by(&nodes[1], entry.segments)];
-        let masks = [segments[0].open() & entry.mask, segments[1].open() & entry.mask];
-        let child = |i: usize| Entry { word: nodes[i].word, mask: masks[i], segments: segments[i] };
-        if masks[0] == 0 {
-            return (masks[1] != 0).then(|| child(1));
-        }
-        if masks[1] == 0 {
-            return Some(child(0));
-        }
-        let first = usize::from(slabs.backward[entry.word.order()]);
-        stack.push(child(1 - first));
-        Some(child(first))
-    }
+/// What is left of a ray's range after one plane; `None` when nothing is.
+#[cfg(test)]
+#[inline(always)]
+pub(super) fn cut_once<S: Simd>(ray: &TravRay, plane: f32, side: Side) -> Option<[f64; 2]> {
+    let packet = PacketRays::new(std::slice::from_ref(ray));
+    let slabs = PacketSlabs::<S>::new(&packet, ray.range().dir.to_array().map(|d| d < 0.0));
+    let segments = slabs.cut(plane, side, Segments { near: slabs.t_near, far: slabs.limit });
+    let mut rows = [[0.0; PACKET]; 2];
+    segments.near.store(&mut rows[0]);
+    segments.far.store(&mut rows[1]);
+    (segments.open() & 1 == 1).then(|| [rows[0][0].into(), rows[1][0].into()])
 }

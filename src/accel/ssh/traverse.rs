@@ -18,36 +18,43 @@ use crate::{
 /// Absolute slack of the f32 node test: above every underflow it may meet.
 pub(super) const SLACK: f32 = f32::MIN_POSITIVE;
 
+/// The part of a ray inside a node, from `near` to `far`. Two fields, not an array: those are kept in registers.
+#[derive(Clone, Copy)]
+pub(super) struct Segment<T> {
+    near: T,
+    far: T,
+}
+
 /// A node to visit and the part of the ray inside it. At most one a level, and the builder bounds the depth.
-type Stack<T> = ArrayVec<(Word, [T; 2]), MAX_DEPTH>;
+type Stack<T> = ArrayVec<(Word, Segment<T>), MAX_DEPTH>;
 
 /// A way to cut a ray's segment with a plane: in f32 for ordinary rays, in f64 for all.
 pub(super) trait SlabTest: Copy {
     type T: Copy;
 
     /// The part of the segment that may lie inside of the plane.
-    fn cut(&self, plane: f32, side: Side, segment: [Self::T; 2]) -> [Self::T; 2];
+    fn cut(&self, plane: f32, side: Side, segment: Segment<Self::T>) -> Segment<Self::T>;
     /// False when a segment is surely empty.
-    fn is_open(segment: [Self::T; 2]) -> bool;
+    fn is_open(segment: Segment<Self::T>) -> bool;
     /// The ray's range.
-    fn range(&self) -> [Self::T; 2];
+    fn range(&self) -> Segment<Self::T>;
     /// Nothing beyond the best hit counts any more.
     fn limit(&mut self, best: &Closest);
     /// The segment up to the limit.
-    fn limited(&self, segment: [Self::T; 2]) -> [Self::T; 2];
+    fn limited(&self, segment: Segment<Self::T>) -> Segment<Self::T>;
     /// False when the ray surely misses the boxes of all triangles of a block, or of one lane, within the segment.
-    fn may_meet<S: Simd>(&self, block: &TriBlock, lanes: u32, segment: [Self::T; 2]) -> bool;
+    fn may_meet<S: Simd>(&self, block: &TriBlock, lane: Option<usize>, segment: Segment<Self::T>) -> bool;
     /// True when the ray runs downward along an axis.
     fn is_backward(&self, axis: usize) -> bool;
 
     #[inline(always)]
-    fn cut_by(&self, node: &Node, segment: [Self::T; 2]) -> [Self::T; 2] {
+    fn cut_by(&self, node: &Node, segment: Segment<Self::T>) -> Segment<Self::T> {
         self.cut(node.plane, node.word.side(), segment)
     }
 
     /// The range within the root's box.
     #[inline(always)]
-    fn clipped(&self, bounds: &Aabb) -> [Self::T; 2] {
+    fn clipped(&self, bounds: &Aabb) -> Segment<Self::T> {
         let mut segment = self.range();
         for side in Side::ALL {
             segment = self.cut(side.of(bounds), side, segment);
@@ -57,13 +64,14 @@ pub(super) trait SlabTest: Copy {
 }
 
 /// What an axis and side make of a plane.
+#[repr(C, align(16))]
 #[derive(Clone, Copy, Debug)]
-struct Row<T> {
-    origin: T,
+struct Row {
+    origin: f32,
     /// Factor for an entry; NaN when the ray leaves through this side.
-    entry: T,
+    entry: f32,
     /// Factor for an exit; NaN when the ray enters through this side.
-    exit: T,
+    exit: f32,
 }
 
 /// One plane at a time. A product with NaN loses in the minimum and maximum, so each plane moves one end of the segment without a branch.
@@ -80,7 +88,7 @@ struct Row<T> {
 /// (+inf, upper) never cut and those of empty subtrees (-inf, upper) always do.
 #[derive(Clone, Copy)]
 struct FastSlabs {
-    rows: [Row<f32>; Side::ROWS],
+    rows: [Row; Side::ROWS],
     near: f32,
     limit: f32,
     backward: [bool; 3],
@@ -113,21 +121,21 @@ impl SlabTest for FastSlabs {
     type T = f32;
 
     #[inline(always)]
-    fn cut(&self, plane: f32, side: Side, [near, far]: [f32; 2]) -> [f32; 2] {
+    fn cut(&self, plane: f32, side: Side, Segment { near, far }: Segment<f32>) -> Segment<f32> {
         let row = &self.rows[side.row()];
         let distance = plane - row.origin;
         let (entry, exit) = (distance * row.entry, distance * row.exit);
-        [if entry > near { entry } else { near }, if exit < far { exit } else { far }]
+        Segment { near: if entry > near { entry } else { near }, far: if exit < far { exit } else { far } }
     }
 
     #[inline(always)]
-    fn is_open([near, far]: [f32; 2]) -> bool {
+    fn is_open(Segment { near, far }: Segment<f32>) -> bool {
         near <= far + SLACK
     }
 
     #[inline(always)]
-    fn range(&self) -> [f32; 2] {
-        [self.near, self.limit]
+    fn range(&self) -> Segment<f32> {
+        Segment { near: self.near, far: self.limit }
     }
 
     #[inline(always)]
@@ -136,25 +144,26 @@ impl SlabTest for FastSlabs {
     }
 
     #[inline(always)]
-    fn limited(&self, [near, far]: [f32; 2]) -> [f32; 2] {
-        [near, if self.limit < far { self.limit } else { far }]
+    fn limited(&self, Segment { near, far }: Segment<f32>) -> Segment<f32> {
+        Segment { near, far: if self.limit < far { self.limit } else { far } }
     }
 
     /// The triangles' boxes cost a third of the exact test, and nodes of one plane lead to leaves that most rays miss.
     #[inline(always)]
-    fn may_meet<S: Simd>(&self, block: &TriBlock, lanes: u32, [near, far]: [f32; 2]) -> bool {
+    fn may_meet<S: Simd>(&self, block: &TriBlock, lane: Option<usize>, Segment { near, far }: Segment<f32>) -> bool {
         let (mut near, mut far) = (S::F4::splat(near), S::F4::splat(far));
         let planes = block.boxes::<S>();
         for axis in 0..3 {
             let backward = self.backward[axis];
-            let (entry, exit) = (&self.rows[axis + 4 * usize::from(backward)], &self.rows[axis + 4 * usize::from(!backward)]);
+            let (entry, exit) =
+                (&self.rows[axis + 4 * usize::from(backward)], &self.rows[axis + 4 * usize::from(!backward)]);
             let [low, high] = planes[axis];
             let (first, second) = if backward { (high, low) } else { (low, high) };
             let origin = S::F4::splat(entry.origin);
             near = ((first - origin) * S::F4::splat(entry.entry)).max(near);
             far = ((second - origin) * S::F4::splat(exit.exit)).min(far);
         }
-        (near - far).le(S::F4::splat(SLACK)) & lanes != 0
+        (near - far).le(S::F4::splat(SLACK)) & lane.map_or(15, |lane| 1 << lane) != 0
     }
 
     #[inline(always)]
@@ -189,35 +198,35 @@ impl WideSlabs {
 impl SlabTest for WideSlabs {
     type T = f64;
 
-    fn cut(&self, plane: f32, side: Side, [near, far]: [f64; 2]) -> [f64; 2] {
+    fn cut(&self, plane: f32, side: Side, Segment { near, far }: Segment<f64>) -> Segment<f64> {
         let axis = side.axis();
         let t = (f64::from(plane) - self.origin[axis]) * self.inv[axis];
         if side.is_upper() == self.is_backward(axis) {
             let entry = t * (2.0 - WIDEN);
-            [if entry > near { entry } else { near }, far]
+            Segment { near: if entry > near { entry } else { near }, far }
         } else {
             let exit = t * WIDEN;
-            [near, if exit < far { exit } else { far }]
+            Segment { near, far: if exit < far { exit } else { far } }
         }
     }
 
-    fn is_open([near, far]: [f64; 2]) -> bool {
+    fn is_open(Segment { near, far }: Segment<f64>) -> bool {
         near <= far
     }
 
-    fn range(&self) -> [f64; 2] {
-        [self.near, self.limit]
+    fn range(&self) -> Segment<f64> {
+        Segment { near: self.near, far: self.limit }
     }
 
     fn limit(&mut self, best: &Closest) {
         self.limit = best.t_high();
     }
 
-    fn limited(&self, [near, far]: [f64; 2]) -> [f64; 2] {
-        [near, far.min(self.limit)]
+    fn limited(&self, Segment { near, far }: Segment<f64>) -> Segment<f64> {
+        Segment { near, far: far.min(self.limit) }
     }
 
-    fn may_meet<S: Simd>(&self, _block: &TriBlock, _lanes: u32, _segment: [f64; 2]) -> bool {
+    fn may_meet<S: Simd>(&self, _block: &TriBlock, _lane: Option<usize>, _segment: Segment<f64>) -> bool {
         true
     }
 
@@ -229,7 +238,7 @@ impl SlabTest for WideSlabs {
 /// The word, in a way that keeps the branch that led here: processors predict the child well, while choosing it by
 /// arithmetic would make each step wait for the plane test of the one before.
 #[inline(always)]
-fn predicted(word: Word) -> Word {
+pub(super) fn predicted(word: Word) -> Word {
     word.map_bits(branch_barrier)
 }
 
@@ -307,17 +316,35 @@ impl Ssh {
         let mut word = self.root;
         loop {
             if word.is_leaf() {
-                let (blocks, lanes) = self.leaf_blocks(word, count);
+                let (blocks, lane) = self.leaf_blocks(word, count);
                 for block in blocks {
-                    if !test.may_meet::<S>(block, lanes, segment) {
+                    if !test.may_meet::<S>(block, lane, segment) {
                         continue;
                     }
                     block.closest::<S, C, K>(ray, &block_ray, best, sink, count);
                 }
                 test.limit(best);
-            } else if let Some(next) = self.descend(&test, &mut stack, word, segment, count) {
-                (word, segment) = next;
-                continue;
+            } else {
+                count.node();
+                count.node();
+                let nodes = &self.pairs[word.index()].0;
+                let nearer = usize::from(test.is_backward(word.order()));
+                let (first, second) = (&nodes[nearer], &nodes[1 - nearer]);
+                let (segment1, segment2) = (test.cut_by(first, segment), test.cut_by(second, segment));
+                let (open1, open2) = (N::is_open(segment1), N::is_open(segment2));
+                if open1 {
+                    if open2 {
+                        stack.push((second.word, segment2));
+                    }
+                    word = predicted(first.word);
+                    segment = segment1;
+                    continue;
+                }
+                if open2 {
+                    word = predicted(second.word);
+                    segment = segment2;
+                    continue;
+                }
             }
             (word, segment) = loop {
                 let Some((word, segment)) = stack.pop() else { return };
@@ -347,17 +374,35 @@ impl Ssh {
         let mut word = self.root;
         loop {
             if word.is_leaf() {
-                let (blocks, lanes) = self.leaf_blocks(word, count);
+                let (blocks, lane) = self.leaf_blocks(word, count);
                 for block in blocks {
-                    if test.may_meet::<S>(block, lanes, segment)
+                    if test.may_meet::<S>(block, lane, segment)
                         && block.occluded::<S, C, K>(ray, &block_ray, sink, count)
                     {
                         return true;
                     }
                 }
-            } else if let Some(next) = self.descend(test, &mut stack, word, segment, count) {
-                (word, segment) = next;
-                continue;
+            } else {
+                count.node();
+                count.node();
+                let nodes = &self.pairs[word.index()].0;
+                let nearer = usize::from(test.is_backward(word.order()));
+                let (first, second) = (&nodes[nearer], &nodes[1 - nearer]);
+                let (segment1, segment2) = (test.cut_by(first, segment), test.cut_by(second, segment));
+                let (open1, open2) = (N::is_open(segment1), N::is_open(segment2));
+                if open1 {
+                    if open2 {
+                        stack.push((second.word, segment2));
+                    }
+                    word = predicted(first.word);
+                    segment = segment1;
+                    continue;
+                }
+                if open2 {
+                    word = predicted(second.word);
+                    segment = segment2;
+                    continue;
+                }
             }
             match stack.pop() {
                 Some(next) => (word, segment) = next,
@@ -365,33 +410,17 @@ impl Ssh {
             }
         }
     }
+}
 
-    /// Cuts the segment with both children of an inner node: the one to visit next, if any; the other goes to the stack.
-    #[inline(always)]
-    fn descend<N: SlabTest, C: Counter>(
-        &self,
-        test: &N,
-        stack: &mut Stack<N::T>,
-        word: Word,
-        segment: [N::T; 2],
-        count: &mut C,
-    ) -> Option<(Word, [N::T; 2])> {
-        count.node();
-        count.node();
-        let nodes = &self.pairs[word.index()].0;
-        let [first, second] = [0, 1].map(|i| (nodes[i].word, test.cut_by(&nodes[i], segment)));
-        match (N::is_open(first.1), N::is_open(second.1)) {
-            (true, true) if test.is_backward(word.order()) => {
-                stack.push(first);
-                Some((predicted(second.0), second.1))
-            }
-            (true, true) => {
-                stack.push(second);
-                Some((predicted(first.0), first.1))
-            }
-            (true, false) => Some((predicted(first.0), first.1)),
-            (false, true) => Some((predicted(second.0), second.1)),
-            (false, false) => None,
-        }
-    }
+/// What is left of a ray's range after one plane, by both kernels; `None` when nothing is.
+#[cfg(test)]
+pub(super) fn cut_once(ray: &TravRay, plane: f32, side: Side) -> [Option<[f64; 2]>; 2] {
+    let far = ray.range().t_far;
+    let (fast, wide) = (FastSlabs::new(ray, far), WideSlabs::new(ray, f64::from(far)));
+    let fast = fast.cut(plane, side, fast.range());
+    let wide = wide.cut(plane, side, wide.range());
+    [
+        FastSlabs::is_open(fast).then(|| [fast.near.into(), fast.far.into()]),
+        WideSlabs::is_open(wide).then_some([wide.near, wide.far]),
+    ]
 }
