@@ -58,7 +58,8 @@ fn ray_counts_agree_with_those_of_havran_and_sixta() {
             assert_close(found.rays, due.rays, rays, &format!("{name}, {what} rays"));
             assert_close(found.hits, due.hits, hits, &format!("{name}, {what} hits"));
         };
-        // How shadow rays from within flat glass were counted is not known: with one rule 21 % fewer hit something, with the other 15 % more.
+        // How shadow rays from within flat glass were counted is not known: with one rule 21 % fewer hit something,
+        // with the other 15 % more.
         let shadow_hits = if kind == SpdKind::Gears { 0.21 } else { 0.14 };
         check(found.shadow, due.shadow, 0.02, shadow_hits, "shadow");
         check(found.secondary, due.secondary, 0.03, 0.06, "secondary");

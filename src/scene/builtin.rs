@@ -1,5 +1,5 @@
-//! The scenes compiled into the program: files that `examples/make_scenes` makes (`animations/SOURCES.md` tells of them), and the
-//! databases of [`spd`](super::spd), which are made when they are asked for.
+//! The scenes compiled into the program: files that `examples/make_scenes` makes (`animations/SOURCES.md` tells of
+//! them), and the databases of [`spd`](super::spd), which are made when they are asked for.
 
 use super::{
     Scene,

@@ -58,7 +58,8 @@ impl Flake {
     }
 }
 
-/// `v` under the rotation that takes +Z to the unit vector `direction`: about their common normal, about Y when they are opposite.
+/// `v` under the rotation that takes +Z to the unit vector `direction`: about their common normal, about Y when they
+/// are opposite.
 fn from_z(v: DVec3, direction: DVec3) -> DVec3 {
     let axis = DVec3::Z.cross(direction);
     let sin = axis.length();

@@ -136,7 +136,8 @@ impl<F: Fn(DVec3) -> DVec3> MeshMaker<F> {
     }
 }
 
-/// Unit normal of a plane polygon by the sum over its edges (Newell): the side from which it is counter-clockwise. +Z without area.
+/// Unit normal of a plane polygon by the sum over its edges (Newell): the side from which it is counter-clockwise. +Z
+/// without area.
 pub(super) fn polygon_normal(corners: &[DVec3]) -> DVec3 {
     let Some(&first) = corners.first() else { return DVec3::Z };
     let sum = |sum: DVec3, pair: &[DVec3]| sum + (pair[0] - first).cross(pair[1] - first);

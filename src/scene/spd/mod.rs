@@ -1,11 +1,12 @@
 //! The Standard Procedural Databases: scenes that are numbers, not files.
 //!
-//! [`SpdKind::generate`] lists a scene's primitives at a size factor: spheres, cones, polygons and triangles in f64, with materials,
-//! lights, camera and background; [`SpdScene::tessellate`] turns them into a [`Scene`](super::Scene).
+//! [`SpdKind::generate`] lists a scene's primitives at a size factor: spheres, cones, polygons and triangles in f64,
+//! with materials, lights, camera and background; [`SpdScene::tessellate`] turns them into a [`Scene`](super::Scene).
 //!
 //! # Source
-//! E. Haines, "A Proposal for Standard Graphics Environments", 1987, and the package's versions 3.4 to 3.15 (not copyrighted, free to
-//! use). The scenes are made again from the package's numbers. They stay in its coordinates, right-handed with +Z up in most scenes.
+//! E. Haines, "A Proposal for Standard Graphics Environments", 1987, and the package's versions 3.4 to 3.15 (not
+//! copyrighted, free to use). The scenes are made again from the package's numbers. They stay in its coordinates,
+//! right-handed with +Z up in most scenes.
 
 mod balls;
 mod gears;

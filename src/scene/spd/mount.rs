@@ -59,7 +59,8 @@ struct Mountain {
 }
 
 impl Mountain {
-    /// Splits the square of `width` cells at `at` with its corner heights, counter-clockwise from the lower left, down to cells.
+    /// Splits the square of `width` cells at `at` with its corner heights, counter-clockwise from the lower left, down
+    /// to cells.
     fn grow(&self, scene: &mut SpdScene, width: u32, at: [u32; 2], heights: [f64; 4]) {
         let [x, y] = at;
         let [ll, lr, ur, ul] = heights;
@@ -90,7 +91,8 @@ impl Mountain {
         scene.add_polygon(self.rock, [corners[2], corners[3], corners[0]]);
     }
 
-    /// The package's first hash of a lattice point. From size 8 on its last term would be shifted by a negative count, and is left out.
+    /// The package's first hash of a lattice point. From size 8 on its last term would be shifted by a negative count,
+    /// and is left out.
     fn hash(&self, a: u32, b: u32) -> u64 {
         let (a, b) = (u64::from(a), u64::from(b));
         let last = 7u32.checked_sub(self.size).map_or(0, |shift| a << shift);

@@ -34,7 +34,8 @@ pub enum SpdShape {
         /// Radius there, positive, at most `base_radius`.
         apex_radius: f64,
     },
-    /// A plane polygon, counter-clockwise seen from its front; it may be concave, but its corners are in angular order around their mean.
+    /// A plane polygon, counter-clockwise seen from its front; it may be concave, but its corners are in angular order
+    /// around their mean.
     Polygon(Box<[DVec3]>),
     /// A triangle with unit normals to interpolate, counter-clockwise seen from its front.
     Patch {

@@ -49,7 +49,8 @@ fn add_wall(scene: &mut SpdScene, eye: DVec3, spread: f64) {
     scene.add_polygon(white, [(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)].map(corner));
 }
 
-/// A pentagon in the plane z = 0, and five that are tilted by the angle between a dodecahedron's faces and turned about z.
+/// A pentagon in the plane z = 0, and five that are tilted by the angle between a dodecahedron's faces and turned about
+/// z.
 fn pentagons() -> [[DVec3; 5]; 6] {
     let flat: [DVec3; 5] = std::array::from_fn(|i| on_circle(i as f64 * 2.0 * PI / 5.0) / (1.0 + RADIUS));
     let tilt = 2.0 * libm::acos(libm::cos(FRAC_PI_3) / libm::sin(PI / 5.0));

@@ -1,10 +1,11 @@
 //! The teapot's control net.
 //!
 //! # Source
-//! M. Newell, University of Utah, 1975: public numeric data, with the bottom that F. Crow added ("The Origins of the Teapot", IEEE CG&A,
-//! January 1987), as the Standard Procedural Databases list it without duplicates.
+//! M. Newell, University of Utah, 1975: public numeric data, with the bottom that F. Crow added ("The Origins of the
+//! Teapot", IEEE CG&A, January 1987), as the Standard Procedural Databases list it without duplicates.
 
-/// Rows of four control points of each bicubic Bezier patch, numbers in [`VERTICES`]: rim, body, handle, spout, lid, bottom.
+/// Rows of four control points of each bicubic Bezier patch, numbers in [`VERTICES`]: rim, body, handle, spout, lid,
+/// bottom.
 #[rustfmt::skip]
 pub(super) const PATCHES: [[u16; 16]; 32] = [
     [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15],

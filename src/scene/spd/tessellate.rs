@@ -11,7 +11,8 @@ use crate::scene::{
     MeshPart, NodeId, PartInstance, Projection, Scene, SceneNode,
 };
 
-/// Largest distance between a round primitive and its triangles, seen from the scene's eye, over the picture's height there.
+/// Largest distance between a round primitive and its triangles, seen from the scene's eye, over the picture's height
+/// there.
 const TOLERANCE: f64 = 1.0 / 4096.0;
 /// Triangles above which [`SpdScene::tessellate`] cuts round primitives more coarsely.
 const BUDGET: usize = 4_000_000;
@@ -23,17 +24,19 @@ const SEGMENTS: (f64, f64) = (4.0, 256.0);
 impl SpdScene {
     /// The scene as triangles: a part for each surface, a camera, and a light for each of the database's.
     ///
-    /// Round primitives are cut finely enough for the scene's own camera at 720 rows or so, and get smooth normals. Scenes with +Z up are
-    /// turned so that +Y is up. Light and material models differ: the lights, which know no falloff, become directional ones through
-    /// the point that the camera looks at (as the package suggests where positions are not at hand), but for those of the lattice; glass lets light through
-    /// without bending it; mirrors mirror the sky; the background colour is not used.
+    /// Round primitives are cut finely enough for the scene's own camera at 720 rows or so, and get smooth normals.
+    /// Scenes with +Z up are turned so that +Y is up. Light and material models differ: the lights, which know no
+    /// falloff, become directional ones through the point that the camera looks at (as the package suggests where
+    /// positions are not at hand), but for those of the lattice; glass lets light through without bending it; mirrors
+    /// mirror the sky; the background colour is not used.
     ///
     /// Cost: up to about 10 million triangles at the largest size factors.
     pub fn tessellate(&self) -> Scene {
         self.tessellate_within(BUDGET)
     }
 
-    /// As [`SpdScene::tessellate`], with round primitives cut so coarsely that there are at most `triangles`, if they can be.
+    /// As [`SpdScene::tessellate`], with round primitives cut so coarsely that there are at most `triangles`, if they
+    /// can be.
     pub fn tessellate_within(&self, triangles: usize) -> Scene {
         let lens = Lens::fitting(self, triangles);
         let parts = (0u32..).zip(&self.surfaces).map(|(i, _)| self.part(i, &lens)).collect();
@@ -53,7 +56,8 @@ impl SpdScene {
         scene
     }
 
-    /// How far any triangle of [`SpdScene::tessellate_within`] may be from the primitive that it stands for, but for roundings to f32.
+    /// How far any triangle of [`SpdScene::tessellate_within`] may be from the primitive that it stands for, but for
+    /// roundings to f32.
     pub fn chord_error(&self, triangles: usize) -> f64 {
         let lens = Lens::fitting(self, triangles);
         let error = |object: &SpdObject| {
@@ -208,7 +212,8 @@ fn add_node(scene: &mut Scene, node: SceneNode) {
     scene.draw_order.push(id);
 }
 
-/// Diffuse and mirrored parts become base colour and metalness, the highlight's exponent a roughness, the part let through an alpha.
+/// Diffuse and mirrored parts become base colour and metalness, the highlight's exponent a roughness, the part let
+/// through an alpha.
 #[expect(clippy::cast_possible_truncation, reason = "colours")]
 fn material(surface: &SpdSurface) -> Material {
     let solid = surface.diffuse + surface.specular;

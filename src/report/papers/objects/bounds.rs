@@ -4,7 +4,8 @@ use glam::{DVec3, Vec3};
 
 use crate::geom::Aabb;
 
-/// Part of the largest coordinate by which boxes grow: far above the error of the tests in f64, far below a rounding to f32.
+/// Part of the largest coordinate by which boxes grow: far above the error of the tests in f64, far below a rounding to
+/// f32.
 const MARGIN: f64 = 1.0 / (1_u64 << 40) as f64;
 
 /// The least `f32` box, with a margin, around a box in f64.

@@ -46,7 +46,8 @@ fn implicit(shape: &SpdShape, p: DVec3) -> (f64, bool) {
     }
 }
 
-/// The first crossing by walking along the ray in small steps, with the least |distance| seen: crossings closer than a step are lost.
+/// The first crossing by walking along the ray in small steps, with the least |distance| seen: crossings closer than a
+/// step are lost.
 fn marched(shape: &SpdShape, ray: &SolidRay) -> (Option<f64>, f64) {
     const STEPS: u32 = 4000;
     let at = |i: u32| 3.0 * f64::from(i) / f64::from(STEPS);

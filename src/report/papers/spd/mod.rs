@@ -1,7 +1,7 @@
 //! Ray counts of the Standard Procedural Databases: what any tracer must find, and what a structure does for it.
 //!
-//! A [`Tracer`] casts the rays of a database's picture over any [`Walker`]. Its [`RayCounts`] stand beside [`published`] ones; its
-//! [`WalkCounts`] are the structure's own, to be divided by the number of rays.
+//! A [`Tracer`] casts the rays of a database's picture over any [`Walker`]. Its [`RayCounts`] stand beside
+//! [`published`] ones; its [`WalkCounts`] are the structure's own, to be divided by the number of rays.
 
 mod counts;
 pub mod published;

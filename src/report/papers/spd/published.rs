@@ -12,7 +12,8 @@ const fn counts(primary_hits: u64, shadow: [u64; 2], secondary: [u64; 2]) -> Ray
 }
 
 /// # Source
-/// V. Havran and F. Sixta, "Comparison of Hierarchical Grids", Ray Tracing News 12(1), 1999: additional material in the package.
+/// V. Havran and F. Sixta, "Comparison of Hierarchical Grids", Ray Tracing News 12(1), 1999: additional material in the
+/// package.
 pub const HAVRAN: [(SpdKind, RayCounts); 8] = [
     (SpdKind::Balls, counts(263_169, [959_244, 285_178], [179_884, 134_368])),
     (SpdKind::Gears, counts(245_332, [2_088_012, 1_057_557], [494_338, 365_338])),

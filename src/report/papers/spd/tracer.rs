@@ -24,11 +24,11 @@ const OFFSET: f64 = 1e-6;
 /// Where published counts read the databases' rules differently.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Rules {
-    /// The package's own: the view's angle lies between the centres of the outermost pixel rows; normals face the ray, so that shadow
-    /// rays from within glass start at its inside.
+    /// The package's own: the view's angle lies between the centres of the outermost pixel rows; normals face the ray,
+    /// so that shadow rays from within glass start at its inside.
     Readme,
-    /// Those of Havran and Sixta, inferred from their counts: the angle lies between the outermost rays; glass keeps its outward
-    /// normal, also for rays from within.
+    /// Those of Havran and Sixta, inferred from their counts: the angle lies between the outermost rays; glass keeps
+    /// its outward normal, also for rays from within.
     Havran,
 }
 
@@ -44,9 +44,9 @@ pub enum RaySet {
 /// Casts the rays of a square picture through its pixels' corners, rows in parallel in the current rayon pool.
 ///
 /// # Source
-/// The rules are those of the Standard Procedural Databases' Readme, "Testing Procedures": eye rays at depth 1, none below 5; reflecting and
-/// transmitting surfaces spawn reflected rays, transmitting ones refracted rays by Snell's law; a shadow ray goes to every light
-/// that the surface does not face away from.
+/// The rules are those of the Standard Procedural Databases' Readme, "Testing Procedures": eye rays at depth 1, none
+/// below 5; reflecting and transmitting surfaces spawn reflected rays, transmitting ones refracted rays by Snell's law;
+/// a shadow ray goes to every light that the surface does not face away from.
 #[derive(Debug)]
 pub struct Tracer<'a, W> {
     scene: &'a SpdScene,
@@ -58,14 +58,15 @@ pub struct Tracer<'a, W> {
     offset: f64,
 }
 
-/// Number of rays, and where they go, of one walk down the tree of rays.
+/// What a row of the picture counts.
 struct Row<'c, C> {
     counts: RayCounts,
     recorder: &'c mut C,
 }
 
 impl<'a, W: Walker> Tracer<'a, W> {
-    /// Prepares a picture of (pixels along a side, which rays). `walker` is a structure over `solids`' boxes, `solids` those of `scene`.
+    /// Prepares a picture of (pixels along a side, which rays). `walker` is a structure over `solids`' boxes, `solids`
+    /// those of `scene`.
     pub fn new(scene: &'a SpdScene, solids: &'a Solids, walker: &'a W, rules: Rules, picture: (u32, RaySet)) -> Self {
         let (pixels, rays) = picture;
         let bounds = solids.boxes().iter().fold(Aabb::EMPTY, |all, b| all.union(*b));

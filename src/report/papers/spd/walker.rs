@@ -20,11 +20,12 @@ pub trait Walker: Sync {
     /// The state of rays that start at `point`; made once for an image's eye.
     fn seat(&self, point: Vec3) -> Self::State;
 
-    /// Shows `visitor` every object that can change its answer, until it ends the walk. `state` is that of the ray's origin.
+    /// Shows `visitor` every object that can change its answer, until it ends the walk. `state` is that of the ray's
+    /// origin.
     fn walk_at<V: Visitor, C: Counter>(&self, ray: &TravRay, state: &Self::State, visitor: &mut V, count: &mut C);
 
-    /// As [`Walker::walk_at`]; `state` becomes that of the point where the ray ends, the hit at [`Visitor::t_limit`], for rays that
-    /// start there.
+    /// As [`Walker::walk_at`]; `state` becomes that of the point where the ray ends, the hit at [`Visitor::t_limit`],
+    /// for rays that start there.
     fn walk_on<V: Visitor, C: Counter>(&self, ray: &TravRay, state: &mut Self::State, visitor: &mut V, count: &mut C) {
         self.walk_at(ray, state, visitor, count);
     }
@@ -141,8 +142,8 @@ impl Walker for BoxGrid {
     }
 }
 
-/// Counts as nodes the boxes that a ray enters before it ends: no structure over the boxes can answer with fewer tests of objects. A ray
-/// that the visitor ends early, because any hit will do, counts one.
+/// Counts as nodes the boxes that a ray enters before it ends: no structure over the boxes can answer with fewer tests
+/// of objects. A ray that the visitor ends early, because any hit will do, counts one.
 #[derive(Debug)]
 pub struct LeastTests {
     tree: BoxTree,
