@@ -13,6 +13,17 @@ pub enum ReportError {
     /// A structure that everything is compared with could not be built.
     #[error(transparent)]
     Build(#[from] BuildError),
+    /// A generated scene does not exist in the size asked for.
+    #[error("{scene}: {reason}")]
+    Scene {
+        /// The scene.
+        scene: String,
+        /// What is wrong.
+        reason: String,
+    },
+    /// No threads could be started for timed work.
+    #[error("cannot start a thread: {0}")]
+    Threads(String),
     /// A file could not be written.
     #[error(transparent)]
     Output(#[from] OutputError),

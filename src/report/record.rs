@@ -12,17 +12,20 @@ pub const SCHEMA: u32 = 1;
 /// Which report it is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
+    /// The papers' tables beside ours.
+    Papers,
     /// Every acceleration structure on every scene.
     Structures,
 }
 
 impl Kind {
     /// The reports that exist.
-    pub const ALL: [Self; 1] = [Self::Structures];
+    pub const ALL: [Self; 2] = [Self::Papers, Self::Structures];
 
     /// Name on the command line and of the files.
     pub fn name(self) -> &'static str {
         match self {
+            Self::Papers => "papers",
             Self::Structures => "structures",
         }
     }

@@ -2,7 +2,7 @@
 
 mod monitor;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use kinora::{
@@ -11,7 +11,7 @@ use kinora::{
     report::{
         Kind, Report, ReportError, Subject,
         baseline::{Baseline, Changes},
-        structures,
+        papers, structures,
     },
 };
 
@@ -24,8 +24,9 @@ pub(crate) struct ReportArgs {
     /// What to measure
     #[arg(value_name = "KIND", value_parser = values::report())]
     kind: Kind,
-    /// Scenes or meshes (.gltf, .glb, builtin:NAME, .tris, .ply, .obj, .stl); without any: the built-in scenes, generated meshes, and growth
-    /// over the number of triangles
+    /// Scenes or meshes (.gltf, .glb, builtin:NAME, .tris, .ply, .obj, .stl). Without any, `structures` takes the built-in scenes, generated
+    /// meshes and growth over the number of triangles. For `papers` they take the places of the papers' models; without any, models are
+    /// looked for in ../shared/assets/meshes, and generated scenes stand in for the rest
     #[arg(value_name = "SCENE")]
     scenes: Vec<String>,
     /// Folder for KIND.json, KIND.md and the plots
@@ -50,7 +51,8 @@ pub(crate) struct ReportArgs {
 pub(crate) fn run(args: &ReportArgs, settings: &Settings) -> Result<(), CliError> {
     let baseline = args.baseline.as_deref().map(|file| Baseline::read(file, args.kind)).transpose()?;
     atomic::prepare(&args.output.join(format!("{}.json", args.kind.name())))?;
-    let subjects = args.scenes.iter().map(|s| subject(s, settings)).collect::<Result<Vec<_>, _>>()?;
+    let scenes = if args.scenes.is_empty() { models_at_hand(args) } else { args.scenes.clone() };
+    let subjects = scenes.iter().map(|s| subject(s, &scenes, settings)).collect::<Result<Vec<_>, _>>()?;
     let unfinished = Unfinished::default();
     let signals = Signals::watch(&unfinished)?;
     let mut watching = Watching::new(&signals, settings.verbosity);
@@ -74,6 +76,10 @@ fn measure(
     watching: &mut Watching<'_>,
 ) -> Result<Report, ReportError> {
     match args.kind {
+        Kind::Papers => {
+            let options = papers::Options { quick: args.quick, simd: settings.simd };
+            papers::report(subjects, &options, watching)
+        }
         Kind::Structures => {
             let mut options = structures::Options { simd: settings.simd, ..structures::Options::new(args.quick) };
             let asked: Result<AccelSpec, _> = settings.accel.parse();
@@ -83,12 +89,27 @@ fn measure(
     }
 }
 
-fn subject(file: &str, settings: &Settings) -> Result<Subject, CliError> {
+/// The papers' models that the shared assets beside the checkout hold.
+fn models_at_hand(args: &ReportArgs) -> Vec<String> {
+    const MODELS: [&str; 2] = ["../shared/assets/meshes/bun_zipper.ply", "../shared/assets/meshes/dragon_res2.glb"];
+    let wanted = if args.kind == Kind::Papers { &MODELS[..] } else { &[] };
+    wanted.iter().filter(|m| Path::new(m).is_file()).map(|&m| m.to_owned()).collect()
+}
+
+fn subject(file: &str, all: &[String], settings: &Settings) -> Result<Subject, CliError> {
+    let name = name(file, all);
     if !geometry::is_mesh(file) {
-        return Ok(Subject::from_scene(file, &scene::load(Some(file), settings)?));
+        return Ok(Subject::from_scene(name, &scene::load(Some(file), settings)?));
     }
     let mut frames = geometry::read(&[file.to_owned()], settings)?;
-    Ok(Subject::still(file, frames.positions.swap_remove(0), frames.indices))
+    Ok(Subject::still(name, frames.positions.swap_remove(0), frames.indices))
+}
+
+/// The file's name without folders, unless another of `all` has the same.
+fn name<'a>(file: &'a str, all: &[String]) -> &'a str {
+    let short = |file: &'a str| Path::new(file).file_name().and_then(|n| n.to_str()).unwrap_or(file);
+    let same = all.iter().filter(|other| Path::new(other).file_name() == Path::new(file).file_name());
+    if same.count() > 1 { file } else { short(file) }
 }
 
 /// What goes to stdout: the files, the bounds, and what changed.
