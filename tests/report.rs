@@ -1,7 +1,11 @@
 //! `kinora report`: files, rows, bounds, comparison with an earlier run, and what it refuses.
 #![cfg(feature = "cli")]
 
-use std::{fs, path::Path};
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    sync::OnceLock,
+};
 
 use assert_cmd::Command;
 use serde_json::Value;
@@ -27,6 +31,20 @@ fn mesh(folder: &Path) -> String {
     path.display().to_string()
 }
 
+/// One quick run that several tests look at: its folder, mesh and stdout.
+fn first_run() -> &'static (PathBuf, String, String) {
+    static RUN: OnceLock<(PathBuf, String, String)> = OnceLock::new();
+    RUN.get_or_init(|| {
+        let dir = Path::new(env!("CARGO_TARGET_TMPDIR")).join("report");
+        let _absent_the_first_time = fs::remove_dir_all(&dir);
+        fs::create_dir_all(&dir).expect("a folder");
+        let (mesh, out) = (mesh(&dir), dir.join("new/report"));
+        let assert = measure(&mesh, &out, &[]).assert().success();
+        let stdout = String::from_utf8_lossy(&assert.get_output().stdout).into_owned();
+        (out, mesh, stdout)
+    })
+}
+
 fn measure(mesh: &str, output: &Path, extra: &[&str]) -> Command {
     let mut command = kinora();
     command.args(["report", "structures", mesh, "--quick", "--threads", "1", "--output"]).arg(output).args(extra);
@@ -44,11 +62,8 @@ fn structures() -> Vec<&'static str> {
 
 #[test]
 fn every_structure_has_rows_and_all_files_are_written() {
-    let dir = tempfile::tempdir().expect("a folder");
-    let out = dir.path().join("new/report");
-    let assert = measure(&mesh(dir.path()), &out, &["--check"]).assert().success();
-    let stdout = String::from_utf8_lossy(&assert.get_output().stdout).into_owned();
-    let report = json(&out);
+    let (out, _, stdout) = first_run();
+    let report = json(out);
     assert_eq!((&report["schema"], &report["kind"]), (&1.into(), &"structures".into()));
     for (key, is_right) in [
         ("commit", report["commit"].is_string()),
@@ -75,7 +90,7 @@ fn every_structure_has_rows_and_all_files_are_written() {
         }
     }
     let mut files: Vec<String> =
-        fs::read_dir(&out).expect("a folder").map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
+        fs::read_dir(out).expect("a folder").map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
     files.sort();
     for file in &files {
         assert!(stdout.contains(file.as_str()), "{file} is named on stdout");
@@ -96,31 +111,27 @@ fn every_structure_has_rows_and_all_files_are_written() {
 
 #[test]
 fn counts_are_the_same_in_every_run_and_a_worse_count_fails_the_check() {
+    let (first, mesh, _) = first_run();
     let dir = tempfile::tempdir().expect("a folder");
-    let (mesh, first) = (mesh(dir.path()), dir.path().join("first"));
-    measure(&mesh, &first, &[]).assert().success();
-    let baseline = first.join("structures.json");
-    let against = |extra: &[&str]| {
-        let mut args = vec!["--baseline", baseline.to_str().unwrap()];
-        args.extend(extra);
-        measure(&mesh, &dir.path().join("second"), &args)
-    };
-    let assert = against(&[]).assert().success();
-    let stdout = String::from_utf8_lossy(&assert.get_output().stdout).into_owned();
-    assert!(!stdout.contains("counted)"), "{stdout}");
-    assert!(stdout.contains("0 rows new, 0 gone"), "{stdout}");
-
-    let mut report = json(&first);
+    let mut report = json(first);
     let rows = report["rows"].as_array_mut().expect("rows");
     let row = rows.iter_mut().find(|r| r["table"] == "build" && r["structure"] == "bvh2").expect("bvh2 has a row");
     row["node_bytes_per_triangle"] = 1.0.into();
+    let baseline = dir.path().join("baseline.json");
     fs::write(&baseline, report.to_string()).expect("written");
-    against(&[]).assert().success();
-    let assert = against(&["--check"]).assert().code(1);
+    let out = dir.path().join("second");
+    let assert = measure(mesh, &out, &["--check", "--baseline", baseline.to_str().unwrap()]).assert().code(1);
     let output = assert.get_output();
     let (stdout, stderr) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
-    assert!(stdout.contains("worse: build") && stdout.contains("bvh2 / node_bytes_per_triangle: 1.0000"), "{stdout}");
+    let counted: Vec<&str> = stdout.lines().filter(|l| l.ends_with("counted)")).collect();
+    let [change] = counted[..] else { panic!("one count differs: {counted:?}") };
+    assert!(
+        change.starts_with("worse: build / ") && change.contains("bvh2 / node_bytes_per_triangle: 1.0000 ->"),
+        "{change}"
+    );
+    assert!(stdout.contains("0 rows new, 0 gone"), "{stdout}");
     assert!(stderr.contains("counted values worse than the baseline"), "{stderr}");
+    assert!(out.join("structures.json").exists(), "the files are written all the same");
 }
 
 #[test]

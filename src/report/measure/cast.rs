@@ -3,7 +3,7 @@ use crate::{
     accel::{AnyAccel, AnyHit, Closest, Counter, PACKET, TravRay},
     geom::{Hit, PrimId, Ray, Triangles},
     glam::Vec3,
-    simd::{Simd, SimdLevel, Task, dispatch},
+    simd::{Scalar, Simd, SimdLevel, Task, dispatch},
 };
 
 /// What is asked of a ray.
@@ -70,15 +70,18 @@ impl Caster<'_> {
         out
     }
 
-    /// Counts what rays cost, cast one after the other by this thread: all, or as many as [`Counts::work`] below `budget` allows, at
-    /// least one packet. `packet` casts them in packets; then a node met by a packet counts once.
-    pub fn count(&self, rays: &[Ray], ask: Ask, packet: bool, budget: u64) -> Counts {
+    /// Counts what rays cost, cast singly by this thread: all, or as many as [`Counts::work`] below `budget` allows, at least
+    /// sixteen. Counts are those of every SIMD level, so the portable kernels count.
+    pub fn count(&self, rays: &[Ray], ask: Ask, budget: u64) -> Counts {
         let mut counts = Counts::default();
         let mut out = [Answer::MISS; PACKET];
         for rays in rays.chunks(PACKET) {
             let mut part = Counts { rays: rays.len() as u64, ..Counts::default() };
-            let chunk = Chunk { caster: self, rays, ask, packet, out: &mut out[..rays.len()], count: &mut part };
-            dispatch(self.simd, chunk);
+            let chunk = Chunk { caster: self, rays, ask, packet: false, out: &mut out[..rays.len()], count: &mut part };
+            match ask {
+                Ask::Closest => chunk.closest::<Scalar>(),
+                Ask::Blocked => chunk.blocked::<Scalar>(),
+            }
             counts += part;
             if counts.work() > budget {
                 break;

@@ -273,3 +273,41 @@ fn checks(broken: usize, scenes: &[SceneReads]) -> Vec<Check> {
 fn least(a: Option<f64>, b: f64) -> Option<f64> {
     Some(a.map_or(b, |a| a.min(b)))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn scene(triangles: usize, kd: f64, grug: f64) -> SceneReads {
+        let reads = |structure: &str, n: f64| Reads {
+            structure: structure.into(),
+            rays: 1,
+            four: [n, 2.0 * n, 8.0 * n, n],
+            blocks: 1.0,
+            steps: 0.0,
+        };
+        SceneReads { triangles, scene: "s".into(), reads: vec![reads("kdtree", kd), reads("grug", grug)] }
+    }
+
+    fn missed(broken: usize, scenes: &[SceneReads]) -> usize {
+        checks(broken, scenes).iter().filter(|c| c.is_missed()).count()
+    }
+
+    #[test]
+    fn reads_must_fall_on_large_scenes_and_rise_on_tiny_ones() {
+        let large = scene(200_000, 100.0, 30.0);
+        assert!((large.best() - 0.7).abs() < 1e-12);
+        assert_eq!(missed(0, &[scene(500, 10.0, 12.0), large]), 0);
+        assert_eq!(missed(1, &[]), 1);
+        assert_eq!(missed(0, &[scene(500, 10.0, 9.0)]), 1);
+        assert_eq!(missed(0, &[scene(200_000, 10.0, 12.0)]), 2);
+    }
+
+    #[test]
+    fn variants_are_settings_that_exist() {
+        for settings in VARIANTS {
+            assert!(config(settings).is_ok(), "{settings}");
+        }
+        assert!(config("res=7").is_err());
+    }
+}

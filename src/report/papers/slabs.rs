@@ -164,8 +164,8 @@ impl Pair {
         let (mut ssh, slab_tree) = Half::build(subject, "ssh", setup, options.quick)?;
         let caster = |accel| Caster { accel, prims: subject.prims(), simd: options.simd };
         let (boxes, slabs) = (caster(&box_tree), caster(&slab_tree));
-        bvh2.counts = boxes.count(rays, Ask::Closest, false, u64::MAX);
-        ssh.counts = slabs.count(rays, Ask::Closest, false, u64::MAX);
+        bvh2.counts = boxes.count(rays, Ask::Closest, u64::MAX);
+        ssh.counts = slabs.count(rays, Ask::Closest, u64::MAX);
         let due = boxes.answers(rays, Ask::Closest);
         let mut found = slabs.answers(rays, Ask::Closest);
         let mut differences = differing(&due, &found);
@@ -253,4 +253,56 @@ fn checks(pairs: &[Pair]) -> Vec<Check> {
         ));
     }
     checks
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::accel::AccelKind;
+
+    fn half(kind: AccelKind, nodes: u64, prims: u64, node_bytes: usize, seconds: f64) -> Half {
+        let mut time = Samples::default();
+        time.push(seconds);
+        Half {
+            spec: AccelSpec::new(kind),
+            stats: AccelStats { node_bytes, ..AccelStats::default() },
+            counts: Counts { rays: 10, nodes, prims, ..Counts::default() },
+            build: time.clone(),
+            single: time.clone(),
+            packet: time,
+        }
+    }
+
+    /// The paper's bunny.
+    fn pair() -> Pair {
+        Pair {
+            scene: "s".into(),
+            reproduces: true,
+            bvh2: half(AccelKind::Bvh2, 88, 6, 3200, 0.66),
+            ssh: half(AccelKind::Ssh, 180, 13, 800, 0.65),
+            differences: 0,
+        }
+    }
+
+    fn missed(pair: Pair) -> Vec<String> {
+        checks(&[pair]).into_iter().filter(Check::is_missed).map(|c| c.claim).collect()
+    }
+
+    #[test]
+    fn the_papers_own_row_keeps_the_bounds_and_each_fault_is_named() {
+        assert!(missed(pair()).is_empty(), "{:?}", missed(pair()));
+        let faults: [(&str, fn(&mut Pair)); 5] = [
+            ("answers", |p| p.differences = 1),
+            ("node memory", |p| p.ssh.stats.node_bytes = 801),
+            ("nodes a ray", |p| p.ssh.counts.nodes = 300),
+            ("triangles a ray", |p| p.ssh.counts.prims = 30),
+            ("single rays", |p| p.ssh.single.push(1e9)),
+        ];
+        for (word, fault) in faults {
+            let mut pair = pair();
+            fault(&mut pair);
+            let missed = missed(pair);
+            assert!(missed.len() == 1 && missed[0].contains(word), "{word}: {missed:?}");
+        }
+    }
 }

@@ -97,7 +97,7 @@ fn cast(row: &mut GrowthRow, accel: &AnyAccel, subject: &Subject, questions: &Qu
     let (rays, due) = part(questions, n.min(questions.rays.len()));
     let mut found = due.clone();
     if is_primary {
-        row.counts = caster.count(&rays, questions.class.ask(), false, options.budget());
+        row.counts = caster.count(&rays, questions.class.ask(), options.budget());
         row.count = Some(rays.len());
     }
     for repeat in 0..=options.repeats() {

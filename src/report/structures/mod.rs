@@ -53,7 +53,7 @@ impl Options {
 }
 
 /// Settings worth a row of their own, besides the defaults of every kind.
-const VARIANTS: &[&str] = &[];
+const VARIANTS: [&str; 4] = ["ssh:leaf=1", "ssh:refit=rechoose", "events:form=flat", "grug:mode=dda"];
 
 /// Every structure with its default settings, and variants that show a trade.
 pub fn specs() -> Vec<AccelSpec> {
@@ -105,4 +105,18 @@ pub fn report(subjects: &[Subject], options: &Options, monitor: &mut dyn Monitor
     report.checks = checks::checks(&tables);
     report.tables = tables.finish();
     Ok(report)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_kind_and_every_variant_is_measured_once() {
+        let specs = specs();
+        assert_eq!(specs.len(), AccelKind::ALL.len() + VARIANTS.len());
+        for (i, spec) in specs.iter().enumerate() {
+            assert!(!specs[..i].contains(spec), "{spec}");
+        }
+    }
 }

@@ -186,7 +186,7 @@ fn differences(caster: &Caster<'_>, questions: &Questions, budget: u64) -> usize
 /// How many rays cost at most `budget`, by a sample of them.
 pub(super) fn affordable(caster: &Caster<'_>, questions: &Questions, budget: u64) -> usize {
     let sample = rays::spread(&questions.rays, 256);
-    let counts = caster.count(&sample, questions.class.ask(), false, budget / 4);
+    let counts = caster.count(&sample, questions.class.ask(), budget / 4);
     let rays = u128::from(budget) * u128::from(counts.rays) / u128::from(counts.work().max(1));
     usize::try_from(rays).unwrap_or(usize::MAX).clamp(16, questions.rays.len().max(16))
 }
@@ -219,7 +219,7 @@ fn ray_rows(
     let class = questions.class;
     let turn = |b: &Built<'_>, caster: &Caster<'_>| {
         let (rays, due) = part(questions, affordable(caster, questions, options.budget()));
-        let counts = caster.count(&rays, class.ask(), false, options.budget());
+        let counts = caster.count(&rays, class.ask(), options.budget());
         let row = RayRow {
             scene: subject.name.clone(),
             structure: b.spec.to_string(),
