@@ -104,6 +104,9 @@ impl<F: Fn(DVec3) -> DVec3> MeshMaker<F> {
 
     /// A plane polygon whose corners are in angular order around their mean.
     pub(super) fn polygon(&mut self, corners: &[DVec3], normal: DVec3) {
+        if corners.len() < 3 {
+            return;
+        }
         let ring: Vec<_> = corners.iter().map(|&p| self.vertex(p, normal)).collect();
         if is_convex(corners, normal) {
             self.triangles.extend(ring[1..].windows(2).map(|pair| [ring[0], pair[0], pair[1]]));

@@ -13,9 +13,9 @@ pub struct Polygon {
 }
 
 impl Polygon {
-    /// Of at least three corners, counter-clockwise seen from the front. Without area it is never hit.
+    /// Corners counter-clockwise seen from the front. Without area it is never hit.
     pub(super) fn new(corners: &[DVec3]) -> Self {
-        let first = corners[0];
+        let first = corners.first().copied().unwrap_or_default();
         let sum = corners.windows(2).fold(DVec3::ZERO, |sum, p| sum + (p[0] - first).cross(p[1] - first));
         let normal = sum.normalize_or_zero();
         let size = normal.abs();
@@ -31,7 +31,7 @@ impl Polygon {
     /// The crossing of the line, whatever the ray's range.
     pub(super) fn hit(&self, ray: &SolidRay) -> Option<SolidHit> {
         let speed = ray.dir.dot(self.normal);
-        let t = (self.corners[0] - ray.origin).dot(self.normal) / speed;
+        let t = (self.corners.first()? - ray.origin).dot(self.normal) / speed;
         if !t.is_finite() || !self.surrounds(without(ray.at(t), self.dropped)) {
             return None;
         }
@@ -41,7 +41,7 @@ impl Polygon {
     /// An edge counts where it passes `p`'s height, its lower end included, to the right of `p`.
     fn surrounds(&self, p: DVec2) -> bool {
         let mut inside = false;
-        let mut a = self.flat[self.flat.len() - 1];
+        let Some(&(mut a)) = self.flat.last() else { return false };
         for &b in &self.flat {
             if (a.y > p.y) != (b.y > p.y) {
                 // The lower end first, so that both polygons beside an edge decide alike.

@@ -255,6 +255,10 @@ fn objects_without_area_and_rays_along_planes_are_misses() {
     let square = Solid::new(&SpdShape::Polygon(Box::new([DVec3::ZERO, DVec3::X, DVec3::X + DVec3::Y, DVec3::Y])));
     let through = Ray::new(Vec3::new(0.5, 0.0, 1.0), Vec3::NEG_Z);
     let along = Ray::new(Vec3::new(-1.0, 0.5, 0.0), Vec3::X);
+    for corners in [&[][..], &[DVec3::Y]] {
+        let nothing = Solid::new(&SpdShape::Polygon(corners.into()));
+        assert_eq!(nothing.hit(&SolidRay::from(&through), Sides::Both), None);
+    }
     assert_eq!(flat.hit(&SolidRay::from(&through), Sides::Both), None);
     assert_eq!(square.hit(&SolidRay::from(&along), Sides::Both), None);
     let cylinder = SpdShape::Cone { base: DVec3::ZERO, base_radius: 1.0, apex: DVec3::Z, apex_radius: 1.0 };
