@@ -1,5 +1,6 @@
 //! Acceleration structures behind one trait, and the registry of their names.
 
+mod batch;
 mod block;
 mod boxes;
 pub mod bvh2;

@@ -9,10 +9,10 @@
 )]
 
 use kinora::{
-    accel::{AnyAccel, AnyHit, Closest, PACKET, TravRay},
+    accel::{AnyAccel, PACKET},
     geom::{Hit, PrimId, Ray, Triangles},
     glam::Vec3,
-    simd::{Simd, SimdLevel, Task, dispatch},
+    simd::SimdLevel,
 };
 use num_bigint::BigInt;
 use num_rational::BigRational;
@@ -42,90 +42,37 @@ impl Mesh {
     }
 }
 
-struct ClosestTask<'a> {
-    accel: &'a AnyAccel,
-    prims: Triangles<'a>,
-    rays: &'a [Ray],
-}
-
-impl Task for ClosestTask<'_> {
-    type Output = Vec<Option<Hit>>;
-
-    #[inline(always)]
-    fn run<S: Simd>(self) -> Self::Output {
-        let answer = |ray: &Ray| {
-            let ray = TravRay::new(ray)?;
-            let mut best = Closest::new(&ray);
-            self.accel.closest::<S, _, _>(&self.prims, &ray, &mut best, &AnyHit, &mut ());
-            best.hit(&ray)
-        };
-        self.rays.iter().map(answer).collect()
-    }
-}
-
 /// The closest hit of every ray.
 pub(crate) fn closest(accel: &AnyAccel, prims: &Triangles<'_>, rays: &[Ray], level: SimdLevel) -> Vec<Option<Hit>> {
-    dispatch(level, ClosestTask { accel, prims: *prims, rays })
-}
-
-struct OccludedTask<'a>(ClosestTask<'a>);
-
-impl Task for OccludedTask<'_> {
-    type Output = Vec<bool>;
-
-    #[inline(always)]
-    fn run<S: Simd>(self) -> Self::Output {
-        let ClosestTask { accel, prims, rays } = self.0;
-        let answer =
-            |ray: &Ray| TravRay::new(ray).is_some_and(|ray| accel.occluded::<S, _, _>(&prims, &ray, &AnyHit, &mut ()));
-        rays.iter().map(answer).collect()
-    }
+    let mut hits = vec![None; rays.len()];
+    accel.closest_hits(prims, rays, 1, level, &mut hits);
+    hits
 }
 
 /// Whether every ray is blocked.
 pub(crate) fn occluded(accel: &AnyAccel, prims: &Triangles<'_>, rays: &[Ray], level: SimdLevel) -> Vec<bool> {
-    dispatch(level, OccludedTask(ClosestTask { accel, prims: *prims, rays }))
+    let mut blocked = vec![false; rays.len()];
+    accel.blocked(prims, rays, 1, level, &mut blocked);
+    blocked
 }
 
-struct PacketTask<'a>(ClosestTask<'a>);
-
-impl Task for PacketTask<'_> {
-    type Output = (Vec<Option<Hit>>, Vec<bool>);
-
-    #[inline(always)]
-    fn run<S: Simd>(self) -> Self::Output {
-        let ClosestTask { accel, prims, rays } = self.0;
-        let (mut hits, mut blocked) = (Vec::new(), Vec::new());
-        // Packets of every length up to the longest; rays that are none are left out of the active ones.
-        let mut rest = rays;
-        let mut len = 0;
-        while !rest.is_empty() {
-            len = len % PACKET + 1;
-            let (part, tail) = rest.split_at(len.min(rest.len()));
-            rest = tail;
-            let usable: Vec<_> = part.iter().map(TravRay::new).collect();
-            let spare = TravRay::new(&Ray::new(Vec3::ZERO, Vec3::X)).expect("a ray");
-            let packet: Vec<_> = usable.iter().map(|r| r.unwrap_or(spare)).collect();
-            let active = usable.iter().enumerate().fold(0, |bits, (i, r)| bits | (u32::from(r.is_some()) << i));
-            let mut best: Vec<_> = packet.iter().map(Closest::new).collect();
-            let sinks = vec![AnyHit; packet.len()];
-            accel.closest_packet::<S, _, _>(&prims, &packet, active, &mut best, &sinks, &mut ());
-            let mask = accel.occluded_packet::<S, _, _>(&prims, &packet, active, &sinks, &mut ());
-            hits.extend(best.iter().zip(&packet).map(|(best, ray)| best.hit(ray)));
-            blocked.extend((0..packet.len()).map(|i| mask >> i & 1 == 1));
-        }
-        (hits, blocked)
-    }
-}
-
-/// Closest hits and occlusion of rays taken in packets of differing length.
+/// Closest hits and occlusion of rays taken in packets of every length up to the longest.
 pub(crate) fn in_packets(
     accel: &AnyAccel,
     prims: &Triangles<'_>,
     rays: &[Ray],
     level: SimdLevel,
 ) -> (Vec<Option<Hit>>, Vec<bool>) {
-    dispatch(level, PacketTask(ClosestTask { accel, prims: *prims, rays }))
+    let (mut hits, mut blocked) = (vec![None; rays.len()], vec![false; rays.len()]);
+    let (mut start, mut len) = (0, 2);
+    while start < rays.len() {
+        let end = rays.len().min(start + len);
+        accel.closest_hits(prims, &rays[start..end], len, level, &mut hits[start..end]);
+        accel.blocked(prims, &rays[start..end], len, level, &mut blocked[start..end]);
+        start = end;
+        len = if len == PACKET { 2 } else { len + 1 };
+    }
+    (hits, blocked)
 }
 
 /// A finite f32 as a rational.

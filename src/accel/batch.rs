@@ -1,0 +1,135 @@
+//! Many rays at once, compiled once for every structure and level: for callers who need no filter and no counts.
+
+use super::{AnyAccel, AnyHit, Closest, PACKET, TravRay, packet::bits};
+use crate::{
+    geom::{Hit, Ray, Triangles},
+    glam::Vec3,
+    simd::{Simd, SimdLevel, Task, dispatch},
+};
+
+impl AnyAccel {
+    /// The closest hit of every ray, in order, into `out`; a ray that can hit nothing (see [`TravRay::new`]) misses.
+    ///
+    /// Rays go singly where `packet` is 1, else in packets of up to `packet` consecutive ones, which pays for rays close together. The
+    /// answers do not depend on it, nor on `level`. On the calling thread; no allocation.
+    ///
+    /// # Panics
+    /// When `out` is shorter than `rays`, `packet` is 0 or above [`PACKET`], or the machine lacks `level`.
+    pub fn closest_hits(
+        &self,
+        prims: &Triangles<'_>,
+        rays: &[Ray],
+        packet: usize,
+        level: SimdLevel,
+        out: &mut [Option<Hit>],
+    ) {
+        assert!((1..=PACKET).contains(&packet), "packets of {packet} rays");
+        dispatch(level, ClosestBatch { accel: self, prims, rays, packet, out: &mut out[..rays.len()] });
+    }
+
+    /// Whether every ray is blocked, as [`AnyAccel::closest_hits`].
+    ///
+    /// # Panics
+    /// As there.
+    pub fn blocked(&self, prims: &Triangles<'_>, rays: &[Ray], packet: usize, level: SimdLevel, out: &mut [bool]) {
+        assert!((1..=PACKET).contains(&packet), "packets of {packet} rays");
+        dispatch(level, BlockedBatch { accel: self, prims, rays, packet, out: &mut out[..rays.len()] });
+    }
+}
+
+struct ClosestBatch<'a> {
+    accel: &'a AnyAccel,
+    prims: &'a Triangles<'a>,
+    rays: &'a [Ray],
+    packet: usize,
+    out: &'a mut [Option<Hit>],
+}
+
+impl Task for ClosestBatch<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self) {
+        let Self { accel, prims, rays, packet, out } = self;
+        if packet == 1 {
+            for (ray, out) in rays.iter().zip(out) {
+                *out = None;
+                if let Some(ray) = TravRay::new(ray) {
+                    let mut best = Closest::new(&ray);
+                    accel.closest::<S, _, _>(prims, &ray, &mut best, &AnyHit, &mut ());
+                    *out = best.hit(&ray);
+                }
+            }
+            return;
+        }
+        for (rays, out) in rays.chunks(packet).zip(out.chunks_mut(packet)) {
+            let Some((rays, active)) = Together::of(rays) else { return };
+            let mut best = [Closest::new(&rays.0[0]); PACKET];
+            for (best, ray) in best.iter_mut().zip(&rays.0) {
+                *best = Closest::new(ray);
+            }
+            let count = out.len();
+            let sinks = [AnyHit; PACKET];
+            let best = &mut best[..count];
+            accel.closest_packet::<S, _, _>(prims, &rays.0[..count], active, best, &sinks[..count], &mut ());
+            for ((out, best), ray) in out.iter_mut().zip(best).zip(&rays.0) {
+                *out = best.hit(ray);
+            }
+        }
+    }
+}
+
+struct BlockedBatch<'a> {
+    accel: &'a AnyAccel,
+    prims: &'a Triangles<'a>,
+    rays: &'a [Ray],
+    packet: usize,
+    out: &'a mut [bool],
+}
+
+impl Task for BlockedBatch<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self) {
+        let Self { accel, prims, rays, packet, out } = self;
+        if packet == 1 {
+            for (ray, out) in rays.iter().zip(out) {
+                *out = false;
+                if let Some(ray) = TravRay::new(ray) {
+                    *out = accel.occluded::<S, _, _>(prims, &ray, &AnyHit, &mut ());
+                }
+            }
+            return;
+        }
+        for (rays, out) in rays.chunks(packet).zip(out.chunks_mut(packet)) {
+            let Some((rays, active)) = Together::of(rays) else { return };
+            let count = out.len();
+            let sinks = [AnyHit; PACKET];
+            let blocked = accel.occluded_packet::<S, _, _>(prims, &rays.0[..count], active, &sinks[..count], &mut ());
+            out.fill(false);
+            for i in bits(blocked) {
+                out[i] = true;
+            }
+        }
+    }
+}
+
+/// A packet's rays; those that can hit nothing are replaced by a stand-in that is not active.
+struct Together([TravRay; PACKET]);
+
+impl Together {
+    /// The rays, and the bits of those that can hit something.
+    #[inline(always)]
+    fn of(rays: &[Ray]) -> Option<(Self, u32)> {
+        let mut out = Self([TravRay::new(&Ray::new(Vec3::ZERO, Vec3::X))?; PACKET]);
+        let mut active = 0;
+        for (i, ray) in rays.iter().enumerate() {
+            if let Some(ray) = TravRay::new(ray) {
+                out.0[i] = ray;
+                active |= 1 << i;
+            }
+        }
+        Some((out, active))
+    }
+}
