@@ -67,7 +67,12 @@ impl TriBlock {
     /// Corners of the triangle in a lane.
     #[inline(always)]
     pub(super) fn corners(&self, lane: usize) -> [Vec3; 3] {
-        self.corners.map(|[x, y, z]| Vec3::new(x[lane], y[lane], z[lane]))
+        let [[ax, ay, az], [bx, by, bz], [cx, cy, cz]] = &self.corners;
+        [
+            Vec3::new(ax[lane], ay[lane], az[lane]),
+            Vec3::new(bx[lane], by[lane], bz[lane]),
+            Vec3::new(cx[lane], cy[lane], cz[lane]),
+        ]
     }
 
     /// Number of the triangle in a lane, or [`NO_PRIM`].
@@ -79,7 +84,8 @@ impl TriBlock {
     /// The corners in f64.
     #[inline(always)]
     pub(super) fn widened<S: Simd>(&self) -> [D3<S>; 3] {
-        self.corners.map(|corner| corner.map(|axis| S::widen(S::F4::load(&axis))))
+        let [a, b, c] = &self.corners;
+        [widened3::<S>(a), widened3::<S>(b), widened3::<S>(c)]
     }
 
     /// The boxes of the four triangles: lower and upper planes of each axis. Those of lanes that are never hit are points.
@@ -138,7 +144,7 @@ impl TriBlock {
     #[inline(always)]
     fn evaluate<S: Simd>(&self, ray: &BlockRay, t_limit: f64) -> Evaluated<S> {
         let [v0, v1, v2] = self.widened::<S>();
-        let (origin, dir) = (ray.origin.map(S::D4::splat), ray.dir.map(S::D4::splat));
+        let (origin, dir) = (splat3::<S>(&ray.origin), splat3::<S>(&ray.dir));
         let (e1, e2, s) = (sub::<S>(v1, v0), sub::<S>(v2, v0), sub::<S>(origin, v0));
         let (p, q) = (cross::<S>(dir, e2), cross::<S>(s, e1));
         let (det, u, v) = (dot::<S>(e1, p), dot::<S>(s, p), dot::<S>(dir, q));
@@ -251,8 +257,8 @@ impl BlockRay {
     pub(super) fn new(ray: &TravRay) -> Self {
         let range = ray.range();
         Self {
-            origin: range.origin.to_array().map(f64::from),
-            dir: range.dir.to_array().map(f64::from),
+            origin: range.origin.as_dvec3().to_array(),
+            dir: range.dir.as_dvec3().to_array(),
             reach: BOUND * f64::from(range.dir.abs().max_element()),
             t_near: f64::from(range.t_near),
             t_far: f64::from(range.t_far),
@@ -285,13 +291,28 @@ impl Spilled {
 
     #[inline(always)]
     fn hit(&self, block: &TriBlock, lane: usize) -> TriangleHit {
-        let [t_low, t_high, inv_det, u, v, det_error, uv_error] = self.0.map(|row| row[lane]);
+        let [t_low, t_high, inv_det, u, v, det_error, uv_error] = &self.0;
+        let (t_low, t_high, inv_det) = (t_low[lane], t_high[lane], inv_det[lane]);
+        let (u, v, det_error, uv_error) = (u[lane], v[lane], det_error[lane], uv_error[lane]);
         let quotients = Quotients { inv_det, u, v, det_error, uv_error };
         TriangleHit { corners: block.corners(lane), t_low, t_high, quotients }
     }
 }
 
 pub(super) type D3<S> = [<S as Simd>::D4; 3];
+
+// No closures and no `map` here: they do not inherit the features of the function they stand in, and intrinsics become
+// calls.
+
+#[inline(always)]
+fn widened3<S: Simd>(rows: &[[f32; 4]; 3]) -> D3<S> {
+    [S::widen(S::F4::load(&rows[0])), S::widen(S::F4::load(&rows[1])), S::widen(S::F4::load(&rows[2]))]
+}
+
+#[inline(always)]
+fn splat3<S: Simd>(v: &[f64; 3]) -> D3<S> {
+    [S::D4::splat(v[0]), S::D4::splat(v[1]), S::D4::splat(v[2])]
+}
 
 #[inline(always)]
 pub(super) fn sub<S: Simd>(a: D3<S>, b: D3<S>) -> D3<S> {
@@ -300,8 +321,11 @@ pub(super) fn sub<S: Simd>(a: D3<S>, b: D3<S>) -> D3<S> {
 
 #[inline(always)]
 pub(super) fn cross<S: Simd>(a: D3<S>, b: D3<S>) -> D3<S> {
-    let minor = |i: usize, j: usize| a[i].mul_sub_loose(b[j], a[j] * b[i]);
-    [minor(1, 2), minor(2, 0), minor(0, 1)]
+    [
+        a[1].mul_sub_loose(b[2], a[2] * b[1]),
+        a[2].mul_sub_loose(b[0], a[0] * b[2]),
+        a[0].mul_sub_loose(b[1], a[1] * b[0]),
+    ]
 }
 
 #[inline(always)]

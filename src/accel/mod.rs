@@ -23,6 +23,7 @@ mod topology;
 pub use boxes::Visitor;
 pub use counter::ReadCounter;
 pub use packet::PACKET;
+pub(crate) use packet::PacketBoxes;
 pub use query::{AnyHit, Closest, HitSink, TravRay};
 pub use registry::{AccelKind, AccelSpec, AnyAccel, SpecError};
 pub use topology::Cut;

@@ -13,11 +13,11 @@
 use super::{
     Closest, Counter, HitSink, TravRay,
     block::{BlockRay, D3, NO_PRIM, TriBlock, cross, dot, norm1, sub},
-    query::blocks,
+    query::{GROW, ORDINARY_MAX, SHRINK, SLACK, blocks},
 };
 use crate::{
     geom::{
-        PrimId,
+        Aabb, PrimId,
         exact::{BOUND, Quotients, TriangleHit},
     },
     simd::{Lanes, Simd},
@@ -26,81 +26,61 @@ use crate::{
 /// Most rays in a packet.
 pub const PACKET: usize = 16;
 
+/// A bit for every ray.
+const ALL: u32 = u32::MAX >> (32 - PACKET);
+
 /// Up to this many open rays are tested one by one.
 const FEW: u32 = 2;
 
 type Row = [f64; PACKET];
 
-/// The rays of a packet by component, for node tests in f32 and triangles in f64.
+/// The rays of a packet by component. Triangle tests widen what they load.
 pub(super) struct PacketRays {
     pub(super) origin32: [[f32; PACKET]; 3],
     pub(super) dir32: [[f32; PACKET]; 3],
     pub(super) t_near32: [f32; PACKET],
     /// At least `t_limit`.
     pub(super) t_cull: [f32; PACKET],
-    origin: [Row; 3],
-    dir: [Row; 3],
-    reach: Row,
-    t_near: Row,
-    t_far: Row,
+    t_far: [f32; PACKET],
+    /// `|dir|∞`.
+    reach: [f32; PACKET],
     /// Nothing beyond counts any more.
     t_limit: Row,
     common_origin: bool,
-}
-
-#[inline(always)]
-fn widen(to: &mut Row, from: &[f32; PACKET]) {
-    for (to, &from) in to.iter_mut().zip(from) {
-        *to = f64::from(from);
-    }
-}
-
-/// True when all numbers have the same bits.
-#[inline(always)]
-fn is_uniform(row: &[f32; PACKET]) -> bool {
-    row.iter().fold(0, |bits, x| bits | (x.to_bits() ^ row[0].to_bits())) == 0
 }
 
 impl PacketRays {
     /// Spreads up to [`PACKET`] rays, at least one; lanes without a ray repeat the last and must not be active.
     #[inline(always)]
     pub(super) fn new(rays: &[TravRay]) -> Self {
-        let (narrow, wide) = ([0.0; PACKET], [0.0; PACKET]);
+        let row = [0.0; PACKET];
         // Filled in place: a struct of this size made elsewhere would be copied.
         let mut out = Self {
-            origin32: [narrow; 3],
-            dir32: [narrow; 3],
-            t_near32: narrow,
-            t_cull: narrow,
-            origin: [wide; 3],
-            dir: [wide; 3],
-            reach: wide,
-            t_near: wide,
-            t_far: wide,
-            t_limit: wide,
+            origin32: [row; 3],
+            dir32: [row; 3],
+            t_near32: row,
+            t_cull: row,
+            t_far: row,
+            reach: row,
+            t_limit: [0.0; PACKET],
             common_origin: false,
         };
+        let mut differing = 0;
+        let first = rays[0].range().origin;
         for i in 0..PACKET {
             let range = rays[i.min(rays.len() - 1)].range();
             for axis in 0..3 {
                 out.origin32[axis][i] = range.origin[axis];
                 out.dir32[axis][i] = range.dir[axis];
+                differing |= range.origin[axis].to_bits() ^ first[axis].to_bits();
             }
+            out.reach[i] = range.dir.abs().max_element();
             out.t_near32[i] = range.t_near;
             out.t_cull[i] = range.t_far;
+            out.t_far[i] = range.t_far;
+            out.t_limit[i] = f64::from(range.t_far);
         }
-        for axis in 0..3 {
-            widen(&mut out.origin[axis], &out.origin32[axis]);
-            widen(&mut out.dir[axis], &out.dir32[axis]);
-        }
-        widen(&mut out.t_near, &out.t_near32);
-        widen(&mut out.t_far, &out.t_cull);
-        widen(&mut out.t_limit, &out.t_cull);
-        let [x, y, z] = &out.dir32;
-        for i in 0..PACKET {
-            out.reach[i] = BOUND * f64::from(x[i].abs().max(y[i].abs()).max(z[i].abs()));
-        }
-        out.common_origin = out.origin32.iter().all(is_uniform);
+        out.common_origin = differing == 0;
         out
     }
 
@@ -109,6 +89,69 @@ impl PacketRays {
     pub(super) fn set_limit(&mut self, ray: usize, best: &Closest) {
         self.t_limit[ray] = best.t_high();
         self.t_cull[ray] = best.t_cull();
+    }
+}
+
+/// The rays of a packet against single boxes, whatever the signs of their directions.
+#[derive(Debug)]
+pub(crate) struct PacketBoxes {
+    origin: [[f32; PACKET]; 3],
+    inv: [[f32; PACKET]; 3],
+    t_near: [f32; PACKET],
+    /// Rays whose misses the f32 test proves: ordinary ones that are parallel to no plane of a box.
+    tested: u32,
+}
+
+impl PacketBoxes {
+    #[inline(always)]
+    pub(crate) fn new<S: Simd>(rays: &[TravRay; PACKET]) -> Self {
+        let row = [0.0; PACKET];
+        let mut out = Self { origin: [row; 3], inv: [row; 3], t_near: row, tested: 0 };
+        let mut dir = [row; 3];
+        for (i, ray) in rays.iter().enumerate() {
+            let range = ray.range();
+            for (axis, dir) in dir.iter_mut().enumerate() {
+                out.origin[axis][i] = range.origin[axis];
+                dir[i] = range.dir[axis];
+            }
+            out.t_near[i] = range.t_near;
+            let slanted = range.dir.x != 0.0 && range.dir.y != 0.0 && range.dir.z != 0.0;
+            out.tested |= u32::from(slanted && ray.is_ordinary()) << i;
+        }
+        for (inv, dir) in out.inv.iter_mut().zip(&dir) {
+            for first in (0..PACKET).step_by(S::F::LEN) {
+                (S::F::splat(1.0) / S::F::load(&dir[first..])).store(&mut inv[first..]);
+            }
+        }
+        out
+    }
+
+    /// The rays that may meet `aabb` at `limits` or before.
+    ///
+    /// The bounds of [`SHRINK`] and [`GROW`] hold for a factor applied last as for one applied to the reciprocal, and
+    /// rounding keeps order, so the lesser product is the entry's.
+    #[inline(always)]
+    pub(crate) fn meeting<S: Simd>(&self, aabb: &Aabb, limits: &[f32; PACKET]) -> u32 {
+        if aabb.is_empty() {
+            return 0;
+        }
+        let reach = aabb.min.abs().max(aabb.max.abs()).max_element();
+        if reach.is_nan() || reach > ORDINARY_MAX {
+            return ALL;
+        }
+        let mut mask = ALL & !self.tested;
+        for first in (0..PACKET).step_by(S::F::LEN) {
+            let (mut near, mut far) = (S::F::load(&self.t_near[first..]), S::F::load(&limits[first..]));
+            for axis in 0..3 {
+                let (origin, inv) = (S::F::load(&self.origin[axis][first..]), S::F::load(&self.inv[axis][first..]));
+                let low = (S::F::splat(aabb.min[axis]) - origin) * inv;
+                let high = (S::F::splat(aabb.max[axis]) - origin) * inv;
+                near = (low.min(high) * S::F::splat(SHRINK)).max(near);
+                far = (low.max(high) * S::F::splat(GROW)).min(far);
+            }
+            mask |= (near - far).le(S::F::splat(SLACK)) << first;
+        }
+        mask
     }
 }
 
@@ -166,7 +209,8 @@ impl Spread {
             ns: [0.0; 4],
         };
         if packet.common_origin {
-            let origin = packet.origin.map(|row| S::D4::splat(row[0]));
+            let [x, y, z] = &packet.origin32;
+            let origin = [S::D4::splat(f64::from(x[0])), S::D4::splat(f64::from(y[0])), S::D4::splat(f64::from(z[0]))];
             let s = sub::<S>(origin, v0);
             out.cu = stored::<S>(cross::<S>(e2, s));
             out.cv = stored::<S>(cross::<S>(s, e1));
@@ -190,12 +234,12 @@ type W3<S> = [<S as Simd>::D; 3];
 
 #[inline(always)]
 fn splat3<S: Simd>(rows: &Rows3, lane: usize) -> W3<S> {
-    rows.map(|row| S::D::splat(row[lane]))
+    [S::D::splat(rows[0][lane]), S::D::splat(rows[1][lane]), S::D::splat(rows[2][lane])]
 }
 
 #[inline(always)]
-fn load3<S: Simd>(rows: &[Row; 3], first: usize) -> W3<S> {
-    [S::D::load(&rows[0][first..]), S::D::load(&rows[1][first..]), S::D::load(&rows[2][first..])]
+fn load3<S: Simd>(rows: &[[f32; PACKET]; 3], first: usize) -> W3<S> {
+    [S::load_wide(&rows[0][first..]), S::load_wide(&rows[1][first..]), S::load_wide(&rows[2][first..])]
 }
 
 #[inline(always)]
@@ -205,14 +249,17 @@ fn wide_dot<S: Simd>(a: W3<S>, b: W3<S>) -> S::D {
 
 #[inline(always)]
 fn wide_cross<S: Simd>(a: W3<S>, b: W3<S>) -> W3<S> {
-    let minor = |i: usize, j: usize| a[i].mul_sub_loose(b[j], a[j] * b[i]);
-    [minor(1, 2), minor(2, 0), minor(0, 1)]
+    [
+        a[1].mul_sub_loose(b[2], a[2] * b[1]),
+        a[2].mul_sub_loose(b[0], a[0] * b[2]),
+        a[0].mul_sub_loose(b[1], a[1] * b[0]),
+    ]
 }
 
 /// Triangle `lane` against the rays from number `first` on.
 #[inline(always)]
 fn evaluate<S: Simd>(tri: &Spread, lane: usize, packet: &PacketRays, first: usize) -> Evaluated<S> {
-    let dir = load3::<S>(&packet.dir, first);
+    let dir = load3::<S>(&packet.dir32, first);
     let det = wide_dot::<S>(dir, splat3::<S>(&tri.n, lane));
     let (u, v, t, ns);
     if packet.common_origin {
@@ -221,7 +268,7 @@ fn evaluate<S: Simd>(tri: &Spread, lane: usize, packet: &PacketRays, first: usiz
         t = S::D::splat(tri.t[lane]);
         ns = S::D::splat(tri.ns[lane]);
     } else {
-        let (origin, v0) = (load3::<S>(&packet.origin, first), splat3::<S>(&tri.v0, lane));
+        let (origin, v0) = (load3::<S>(&packet.origin32, first), splat3::<S>(&tri.v0, lane));
         let s = [origin[0] - v0[0], origin[1] - v0[1], origin[2] - v0[2]];
         let m = wide_cross::<S>(s, dir);
         u = wide_dot::<S>(splat3::<S>(&tri.e2, lane), m);
@@ -230,7 +277,8 @@ fn evaluate<S: Simd>(tri: &Spread, lane: usize, packet: &PacketRays, first: usiz
         ns = s[0].abs() + s[1].abs() + s[2].abs();
     }
     let w = det - u - v;
-    let (n12, reach) = (S::D::splat(tri.n12[lane]), S::D::load(&packet.reach[first..]));
+    let n12 = S::D::splat(tri.n12[lane]);
+    let reach = S::load_wide(&packet.reach[first..]) * S::D::splat(BOUND);
     let det_error = reach * n12;
     let uv_error = reach * ns.mul_add_loose(S::D::splat(tri.sum[lane]), n12);
     let (low, high) = (u.min(v).min(w), u.max(v).max(w));
@@ -245,7 +293,8 @@ fn evaluate<S: Simd>(tri: &Spread, lane: usize, packet: &PacketRays, first: usiz
     let slack = t.abs().mul_add_loose(det_error, t_error) * inv_det.abs() * S::D::splat(2.0);
     let slack = t.abs().mul_add_loose(S::D::splat(4.0 * f64::EPSILON), slack);
     let (t_low, t_high) = (t - slack, t + slack);
-    let [t_near, t_far, t_limit] = [&packet.t_near, &packet.t_far, &packet.t_limit].map(|r| S::D::load(&r[first..]));
+    let (t_near, t_far) = (S::load_wide(&packet.t_near32[first..]), S::load_wide(&packet.t_far[first..]));
+    let t_limit = S::D::load(&packet.t_limit[first..]);
     let solid = (det_error * S::D::splat(4.0)).le(det.abs());
     let beyond = solid & (t_limit.lt(t_low) | t_high.lt(t_near));
     let inside = uv_error.lt(low) | high.lt(-uv_error);
@@ -268,7 +317,9 @@ impl Spilled {
 
     #[inline(always)]
     fn hit(&self, block: &TriBlock, lane: usize, ray: usize) -> TriangleHit {
-        let [t_low, t_high, inv_det, u, v, det_error, uv_error] = self.0.map(|row| row[ray]);
+        let [t_low, t_high, inv_det, u, v, det_error, uv_error] = &self.0;
+        let (t_low, t_high, inv_det) = (t_low[ray], t_high[ray], inv_det[ray]);
+        let (u, v, det_error, uv_error) = (u[ray], v[ray], det_error[ray], uv_error[ray]);
         let quotients = Quotients { inv_det, u, v, det_error, uv_error };
         TriangleHit { corners: block.corners(lane), t_low, t_high, quotients }
     }
@@ -389,5 +440,87 @@ impl TriBlock {
             }
         }
         blocked
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::Vec3;
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::{
+        geom::Ray,
+        simd::{SimdLevel, Task, dispatch},
+    };
+
+    struct Meeting<'a> {
+        rays: &'a [TravRay; PACKET],
+        aabb: Aabb,
+    }
+
+    impl Task for Meeting<'_> {
+        type Output = u32;
+
+        #[inline(always)]
+        fn run<S: Simd>(self) -> u32 {
+            let limits = std::array::from_fn(|i| self.rays[i].range().t_far);
+            PacketBoxes::new::<S>(self.rays).meeting::<S>(&self.aabb, &limits)
+        }
+    }
+
+    fn meeting(level: SimdLevel, rays: &[Ray; PACKET], aabb: Aabb) -> u32 {
+        let rays = std::array::from_fn(|i| TravRay::new(&rays[i]).unwrap());
+        dispatch(level, Meeting { rays: &rays, aabb })
+    }
+
+    #[test]
+    fn rays_that_pass_a_box_by_are_left_out() {
+        let towards = |i: usize| Ray::new(Vec3::new(0.3, 0.4, 5.0), Vec3::new(i as f32 * 0.05 - 0.01, 0.01, -1.0));
+        let short = |i: usize| Ray { t_far: 3.9, ..towards(i) };
+        let unit = Aabb { min: Vec3::ZERO, max: Vec3::ONE };
+        for level in SimdLevel::available() {
+            assert_eq!(meeting(level, &std::array::from_fn(towards), unit), 0b1111, "{level}");
+            assert_eq!(meeting(level, &std::array::from_fn(short), unit), 0, "{level}");
+            assert_eq!(meeting(level, &std::array::from_fn(towards), Aabb::EMPTY), 0, "{level}");
+        }
+    }
+
+    #[test]
+    fn rays_that_the_test_cannot_judge_are_kept() {
+        let far = Aabb { min: Vec3::splat(9.0), max: Vec3::splat(10.0) };
+        let odd = |i: usize| {
+            let dir = [Vec3::X, Vec3::new(1e-30, 1.0, 1.0), Vec3::NEG_Y, Vec3::new(1.0, 1e30, 1.0)][i % 4];
+            Ray::new(Vec3::ZERO, dir)
+        };
+        let huge = Aabb { min: Vec3::splat(1e30), max: Vec3::splat(2e30) };
+        for level in SimdLevel::available() {
+            assert_eq!(meeting(level, &std::array::from_fn(odd), far), 0xffff, "{level}");
+            let plain = |_| Ray::new(Vec3::ZERO, -Vec3::ONE);
+            assert_eq!(meeting(level, &std::array::from_fn(plain), huge), 0xffff, "{level}");
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn a_box_around_a_point_of_a_ray_is_met(
+            origin in prop::array::uniform3(-1e3_f32..1e3),
+            dir in prop::array::uniform3(prop_oneof![Just(0.0_f32), -1e3_f32..1e3, -1e-6_f32..1e-6]),
+            t in 0_u8..64,
+            grow in prop::array::uniform3(0.0_f32..1.0),
+        ) {
+            let t = f32::from(t) * 0.25;
+            let ray = Ray { t_far: t, ..Ray::new(Vec3::from(origin), Vec3::from(dir)) };
+            prop_assume!(ray.dir != Vec3::ZERO);
+            // t is a multiple of a quarter, so the point is off by one rounding of the sum.
+            let near = (ray.origin.as_dvec3() + ray.dir.as_dvec3() * f64::from(t)).as_vec3();
+            let aabb = Aabb {
+                min: Vec3::new(near.x.next_down(), near.y.next_down(), near.z.next_down()),
+                max: Vec3::new(near.x.next_up(), near.y.next_up(), near.z.next_up()) + Vec3::from(grow),
+            };
+            for level in SimdLevel::available() {
+                prop_assert_eq!(meeting(level, &[ray; PACKET], aabb), 0xffff, "{}", level);
+            }
+        }
     }
 }

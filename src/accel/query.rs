@@ -56,15 +56,21 @@ pub(super) const SHRINK: f32 = 1.0 - WIDEN;
 /// negative, up to an underflow of 2^-150.
 pub(super) const GROW: f32 = 1.0 + WIDEN;
 
+/// Absolute slack of f32 node tests: above every underflow they may meet.
+pub(super) const SLACK: f32 = f32::MIN_POSITIVE;
+
 /// A ray with what traversals derive from it, made once a ray.
 #[derive(Clone, Copy, Debug)]
 pub struct TravRay {
     range: RayRange,
-    inv: Vec3,
     ordinary: bool,
 }
 
 impl TravRay {
+    /// A ray for places that need one and never look at it.
+    pub(crate) const STAND_IN: Self =
+        Self { range: RayRange { origin: Vec3::ZERO, dir: Vec3::X, t_near: 0.0, t_far: 0.0 }, ordinary: true };
+
     /// `None` when the ray can hit nothing: NaN or infinity in origin or direction, zero direction, empty range.
     ///
     /// A negative `t_near` counts as 0.
@@ -81,7 +87,6 @@ impl TravRay {
         }
         Some(Self {
             range: RayRange { origin: ray.origin, dir, t_near: t_near.max(0.0) + 0.0, t_far: t_far + 0.0 },
-            inv: reciprocal(dir),
             ordinary,
         })
     }
@@ -92,10 +97,10 @@ impl TravRay {
         &self.range
     }
 
-    /// Reciprocal direction; infinite where the direction is 0. See [`SHRINK`] and [`GROW`].
+    /// Reciprocal direction; infinite where the direction is 0. See [`SHRINK`] and [`GROW`]. Divides at each call.
     #[inline(always)]
     pub(super) fn inv(&self) -> Vec3 {
-        self.inv
+        reciprocal(self.range.dir)
     }
 
     /// True when f32 node tests on boxes within 2^60 of 0 neither overflow nor lose precision by underflow.

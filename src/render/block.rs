@@ -1,7 +1,7 @@
-//! Blocks of 4 x 4 pixels: their rays are traced together, then shaded, then lit.
+//! Blocks of pixels, a lane each: their rays are traced together, then shaded, then lit.
 //!
-//! Camera rays and secondary rays go in packets and meet the world at one place each, so that the traversals behind
-//! them are compiled once a SIMD level; shading between them is plain code, compiled once.
+//! Everything but the look-ups in meshes and textures is done for all lanes at once, with the operations of a single
+//! point in their order, so that a pixel does not depend on how many lanes there are.
 
 use std::{cell::Cell, ops::Range};
 
@@ -10,282 +10,246 @@ use glam::Vec3;
 use super::{
     context::FrameContext,
     filter::{Layer, Layers, is_seen},
+    found::{Maps, Spots},
     pattern::{PixelSampler, subpixel},
-    plain::PlainPoint,
-    shade::ShadePoint,
+    plain::{self, PlainPoints},
+    probe::{NO_RAY, Points, Probes},
+    shade::LitPoints,
+    surface::Surface,
+    wide::{Bits, Floats, LANES, V3, row},
 };
 use crate::{
     geom::{Hit, Ray},
-    simd::Simd,
+    simd::{Lanes, Simd},
 };
 
-/// Pixels a side of a block.
-pub(crate) const SIDE: u32 = 4;
-const LANES: usize = (SIDE * SIDE) as usize;
+/// Width of a block in pixels; its height is what the lanes of a level fill.
+pub(crate) const COLUMNS: u32 = 4;
 /// Most blended layers of a pixel.
 const LAYERS: usize = 32;
 /// Light that still passes below which further layers are not looked for.
 const OPAQUE: f32 = 1.0 / 512.0;
 
-/// A secondary ray and the light that it brings when nothing is in its way.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Probe {
-    pub(crate) ray: Ray,
-    pub(crate) light: Vec3,
-    /// Width of the footprint in metres, for the alpha of what is in the way.
-    pub(crate) width: f32,
-}
-
-impl Probe {
-    /// Fills places without a probe.
-    const NONE: Self = Self {
-        ray: Ray { origin: Vec3::ZERO, dir: Vec3::ZERO, t_near: 0.0, t_far: 0.0 },
-        light: Vec3::ZERO,
-        width: 0.0,
-    };
-}
-
-/// What the samples of one pixel have found so far.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Pixel {
-    pub(crate) color: Vec3,
-    pub(crate) coverage: f32,
-    pub(crate) depth: f32,
-    pub(crate) instance: u32,
-}
-
-impl Pixel {
-    const EMPTY: Self = Self { color: Vec3::ZERO, coverage: 0.0, depth: f32::INFINITY, instance: 0 };
-}
-
-/// A camera ray on its way through layers.
-#[derive(Clone, Copy, Debug)]
-struct Lane {
-    ray: Ray,
-    /// The last layer met.
-    last: Option<Hit>,
-    /// Part of the light behind that still shows.
-    through: f32,
-    random: PixelSampler,
-    pixel: usize,
-}
-
-/// A point to be lit.
-#[derive(Clone, Copy, Debug)]
-enum Point {
-    Lit(ShadePoint),
-    Plain(PlainPoint),
-}
-
-/// Place of a pixel in its block.
+/// Rows of a block.
 #[inline(always)]
-pub(crate) fn lane(x: u32, y: u32) -> usize {
-    (y * SIDE + x) as usize
+pub(crate) fn block_rows<S: Simd>() -> u32 {
+    #[expect(clippy::cast_possible_truncation, reason = "at most 16")]
+    let lanes = S::F::LEN as u32;
+    lanes / COLUMNS
 }
 
 /// The pixels of a block while they are made.
 #[derive(Debug)]
-pub(crate) struct Block {
-    pub(crate) left: u32,
-    pub(crate) top: u32,
-    columns: Range<u32>,
-    rows: Range<u32>,
-    pub(crate) pixels: [Pixel; LANES],
+pub(crate) struct Block<F> {
+    left: u32,
+    top: u32,
+    /// Lanes that are rendered.
+    pub(crate) mask: u32,
+    /// Sums over the samples.
+    pub(crate) color: V3<F>,
+    pub(crate) coverage: F,
+    /// Of the nearest sample.
+    pub(crate) depth: [f32; LANES],
+    pub(crate) instance: [u32; LANES],
     /// Rays traced.
     pub(crate) rays: u64,
 }
 
-impl Block {
+/// The camera rays of a sample.
+struct CameraRays<F> {
+    rays: [Ray; LANES],
+    dir: V3<F>,
+    random: [PixelSampler; LANES],
+}
+
+impl<F: Floats> Block<F> {
     /// An empty block at (`left`, `top`), of which only `columns` x `rows` are rendered.
+    #[inline(always)]
     pub(crate) fn new(left: u32, top: u32, columns: &Range<u32>, rows: &Range<u32>) -> Self {
-        Self { left, top, columns: columns.clone(), rows: rows.clone(), pixels: [Pixel::EMPTY; LANES], rays: 0 }
+        let mut mask = 0;
+        for y in rows.clone() {
+            for x in columns.clone() {
+                mask |= 1 << ((y - top) * COLUMNS + (x - left));
+            }
+        }
+        Self {
+            left,
+            top,
+            mask,
+            color: V3::zero(),
+            coverage: F::splat(0.0),
+            depth: [f32::INFINITY; LANES],
+            instance: [0; LANES],
+            rays: 0,
+        }
+    }
+
+    /// The pixel of a lane.
+    #[inline(always)]
+    pub(crate) fn pixel(&self, lane: usize) -> (u32, u32) {
+        #[expect(clippy::cast_possible_truncation, reason = "at most 16")]
+        let lane = lane as u32;
+        (self.left + lane % COLUMNS, self.top + lane / COLUMNS)
     }
 
     /// Adds one sample of every pixel.
-    #[inline(always)]
-    pub(crate) fn add_sample<S: Simd>(&mut self, ctx: &FrameContext<'_>, sample: u32) {
-        let mut lanes: [Option<Lane>; LANES] = [None; LANES];
-        self.fill(ctx, sample, &mut lanes);
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    pub(crate) fn add_sample<S: Simd<F = F>>(&mut self, ctx: &FrameContext<'_>, sample: u32) {
+        let camera = self.camera_rays(ctx, sample);
+        let mut nearest = [None; LANES];
+        ctx.world.nearest_hits::<S>(&camera.rays[..F::LEN], &mut nearest);
+        let mut through = F::splat(1.0);
+        let mut last = [None; LANES];
+        let mut active = self.mask;
         for layer in 0..LAYERS {
-            let mut points: [Option<Point>; LANES] = [None; LANES];
-            let mut any = false;
-            let mut nearest: [Option<Hit>; LANES] = [None; LANES];
-            if layer == 0 {
-                trace::<S>(ctx, &lanes, &mut nearest);
-            }
-            for (i, (lane, point)) in lanes.iter_mut().zip(&mut points).enumerate() {
-                let Some(active) = lane else { continue };
-                self.rays += 1;
-                let hit = match nearest[i] {
+            self.rays += u64::from(active.count_ones());
+            let mut seen = [None; LANES];
+            for lane in Bits(active) {
+                let ray = &camera.rays[lane];
+                seen[lane] = match nearest[lane] {
                     None if layer == 0 => None,
-                    Some(hit) if is_seen(ctx, &active.ray, None, &hit) => Some(hit),
-                    _ => next_seen::<S>(ctx, active),
+                    Some(hit) if layer == 0 && is_seen(ctx, ray, None, &hit) => Some(hit),
+                    _ => next_seen::<S>(ctx, ray, last[lane].as_ref()),
                 };
-                let Some(hit) = hit else {
-                    *lane = None;
-                    continue;
-                };
-                active.last = Some(hit);
-                *point = Some(shade(ctx, &active.ray, &hit));
-                any = true;
             }
-            if !any {
+            let spots = Spots::new(ctx, &seen);
+            if spots.mask == 0 {
                 return;
             }
-            self.light::<S>(ctx, &lanes, &mut points);
-            self.take(&mut lanes, &points, layer == 0);
-        }
-    }
-
-    /// The camera rays of one sample.
-    fn fill(&self, ctx: &FrameContext<'_>, sample: u32, lanes: &mut [Option<Lane>; LANES]) {
-        let (jitter_x, jitter_y) = subpixel(sample);
-        for y in self.rows.clone() {
-            for x in self.columns.clone() {
-                let ray = ctx.rays.ray(x as f32 + jitter_x, y as f32 + jitter_y);
-                let random = PixelSampler::new(ctx.settings.seed, ctx.settings.frame, y * ctx.size[0] + x, sample);
-                let pixel = lane(x - self.left, y - self.top);
-                lanes[pixel] = Some(Lane { ray, last: None, through: 1.0, random, pixel });
+            if layer == 0 {
+                self.meet(spots.mask, &seen);
             }
+            through = self.shade::<S>(ctx, &spots, &camera, through);
+            active = spots.mask & F::splat(OPAQUE).le(through);
+            if active == 0 {
+                return;
+            }
+            last = seen;
         }
     }
 
-    /// Traces the secondary rays of every point: the first of each, then the second of each, and so on.
-    #[inline(always)]
-    fn light<S: Simd>(
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    fn camera_rays(&self, ctx: &FrameContext<'_>, sample: u32) -> CameraRays<F> {
+        let (jitter_x, jitter_y) = subpixel(sample);
+        let (mut x, mut y) = ([0.0; LANES], [0.0; LANES]);
+        let settings = &ctx.settings;
+        let mut random = [PixelSampler::new(0, 0, 0, sample); LANES];
+        for lane in 0..F::LEN {
+            let (column, row) = self.pixel(lane);
+            (x[lane], y[lane]) = (column as f32 + jitter_x, row as f32 + jitter_y);
+            random[lane] = PixelSampler::new(settings.seed, settings.frame, row * ctx.size[0] + column, sample);
+        }
+        let [origin, dir] = ctx.rays.lines(F::load(&x), F::load(&y));
+        let ([ox, oy, oz], [dx, dy, dz]) = (origin.rows(), dir.rows());
+        let [t_near, t_far] = ctx.rays.range();
+        let mut rays = [NO_RAY; LANES];
+        for lane in Bits(self.mask) {
+            rays[lane] = Ray {
+                origin: Vec3::new(ox[lane], oy[lane], oz[lane]),
+                dir: Vec3::new(dx[lane], dy[lane], dz[lane]),
+                t_near,
+                t_far,
+            };
+        }
+        CameraRays { rays, dir, random }
+    }
+
+    /// Adds the shaded points at `spots`, of which `through` still shows; returns what shows of things behind.
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    fn shade<'a, S: Simd<F = F>>(
+        &mut self,
+        ctx: &FrameContext<'a>,
+        spots: &Spots<'a>,
+        camera: &CameraRays<F>,
+        through: F,
+    ) -> F {
+        let mut patch = spots.patch::<F>();
+        if ctx.pierced || spots.lanes(|spot| !spot.material.is_plain()) != 0 {
+            patch = patch.with_steps(&ctx.rays, camera.dir, spots.t());
+        }
+        let mut maps = Maps::new(spots, &patch);
+        let surface = Surface::new(ctx, spots, &patch, &mut maps, camera.dir);
+        if ctx.settings.shading.is_lit() {
+            let points = LitPoints::new(ctx, spots, &patch, maps, &surface);
+            self.light::<S, _>(ctx, spots.mask, points, camera, through)
+        } else {
+            let points = PlainPoints::new(ctx, spots, &surface);
+            self.light::<S, _>(ctx, spots.mask, points, camera, through)
+        }
+    }
+
+    /// Traces the secondary rays of every point, the first of each, then the second of each, and so on; then adds the
+    /// points as [`Block::shade`].
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    fn light<S: Simd<F = F>, P: Points<F>>(
         &mut self,
         ctx: &FrameContext<'_>,
-        lanes: &[Option<Lane>; LANES],
-        points: &mut [Option<Point>; LANES],
-    ) {
+        mask: u32,
+        mut points: P,
+        camera: &CameraRays<F>,
+        through: F,
+    ) -> F {
         for number in 0..probe_count(ctx) {
-            let mut probes = [Probe::NONE; LANES];
-            let mut owners = [0; LANES];
-            let mut count = 0;
-            for (i, (lane, point)) in lanes.iter().zip(points.iter()).enumerate() {
-                let (Some(lane), Some(point)) = (lane, point) else { continue };
-                let Some(probe) = point.probe(ctx, number, &lane.random) else { continue };
-                (probes[count], owners[count]) = (probe, i);
-                count += 1;
-            }
-            self.rays += count as u64;
-            let arriving = transmittances::<S>(ctx, &probes[..count]);
-            for i in 0..count {
-                if let Some(point) = &mut points[owners[i]] {
-                    *point.color() += probes[i].light * arriving[i];
-                }
+            let probes = points.probes(ctx, number, &camera.random);
+            if probes.mask != 0 {
+                self.rays += u64::from(probes.mask.count_ones());
+                let arriving = transmittances::<S>(ctx, &probes);
+                points.add(probes.mask, probes.light * arriving);
             }
         }
+        let one = F::splat(1.0);
+        let (color, alpha) = points.result();
+        let share = alpha * through;
+        self.color = V3::select(mask, self.color + color * share, self.color);
+        self.coverage = F::select(mask, self.coverage + share, self.coverage);
+        F::select(mask, through * (one - alpha), F::splat(0.0))
     }
 
-    /// Adds shaded points to their pixels; lanes that need no further layer end.
-    fn take(&mut self, lanes: &mut [Option<Lane>; LANES], points: &[Option<Point>; LANES], first: bool) {
-        for (lane, point) in lanes.iter_mut().zip(points) {
-            let (Some(active), Some(point)) = (lane.as_mut(), point) else { continue };
-            let pixel = &mut self.pixels[active.pixel];
-            if first && let Some(hit) = active.last.filter(|hit| hit.t < pixel.depth) {
-                (pixel.depth, pixel.instance) = (hit.t, hit.instance.0 + 1);
+    /// Notes depth and instance of first layers.
+    #[inline(always)]
+    fn meet(&mut self, mask: u32, hits: &[Option<Hit>; LANES]) {
+        for lane in Bits(mask) {
+            if let Some(hit) = hits[lane].filter(|hit| hit.t < self.depth[lane]) {
+                (self.depth[lane], self.instance[lane]) = (hit.t, hit.instance.0 + 1);
             }
-            let (color, alpha) = point.result();
-            pixel.color += color * (alpha * active.through);
-            pixel.coverage += alpha * active.through;
-            active.through *= 1.0 - alpha;
-            if active.through < OPAQUE {
-                *lane = None;
-            }
-        }
-    }
-}
-
-impl Point {
-    fn probe(&self, ctx: &FrameContext<'_>, number: usize, random: &PixelSampler) -> Option<Probe> {
-        match self {
-            Self::Lit(point) => point.probe(ctx, number, random),
-            Self::Plain(point) => point.probe(ctx, number, random),
-        }
-    }
-
-    fn color(&mut self) -> &mut Vec3 {
-        match self {
-            Self::Lit(point) => &mut point.color,
-            Self::Plain(point) => &mut point.color,
-        }
-    }
-
-    fn result(&self) -> (Vec3, f32) {
-        match self {
-            Self::Lit(point) => (point.color, point.alpha),
-            Self::Plain(point) => (point.color, 1.0),
         }
     }
 }
 
 /// Secondary rays a point.
-fn probe_count(ctx: &FrameContext<'_>) -> usize {
-    if ctx.settings.shading.is_lit() { ctx.lights.len() } else { PlainPoint::probe_count(ctx.settings.shading) }
-}
-
-fn shade(ctx: &FrameContext<'_>, ray: &Ray, hit: &Hit) -> Point {
-    if ctx.settings.shading.is_lit() {
-        Point::Lit(ShadePoint::new(ctx, ray, hit))
-    } else {
-        Point::Plain(PlainPoint::new(ctx, ray, hit))
-    }
-}
-
-/// The nearest hit of every camera ray, whether it counts or not: nearly always it does.
 #[inline(always)]
-fn trace<S: Simd>(ctx: &FrameContext<'_>, lanes: &[Option<Lane>; LANES], nearest: &mut [Option<Hit>; LANES]) {
-    let mut rays = [Probe::NONE.ray; LANES];
-    let mut owners = [0; LANES];
-    let mut count = 0;
-    for (i, lane) in lanes.iter().enumerate() {
-        if let Some(lane) = lane {
-            (rays[count], owners[count]) = (lane.ray, i);
-            count += 1;
-        }
-    }
-    let mut hits = [None; LANES];
-    ctx.world.nearest_hits::<S>(&rays[..count], &mut hits[..count]);
-    for i in 0..count {
-        nearest[owners[i]] = hits[i];
-    }
+fn probe_count(ctx: &FrameContext<'_>) -> usize {
+    if ctx.settings.shading.is_lit() { ctx.lights.len() } else { plain::probe_count(ctx.settings.shading) }
 }
 
 /// The next thing that a camera ray sees where the nearest hit does not count: a culled face, a hole, a layer already met.
 ///
 /// The range is closed and layers up to the last are refused, so none is lost and none is met twice.
-#[inline(always)]
-fn next_seen<S: Simd>(ctx: &FrameContext<'_>, lane: &Lane) -> Option<Hit> {
-    let after = lane.last.as_ref().map(Layer::new);
-    let rest = Ray { t_near: lane.last.map_or(lane.ray.t_near, |hit| hit.t), ..lane.ray };
-    ctx.world.closest_hit::<S, _>(&rest, &|hit: &Hit| is_seen(ctx, &lane.ray, after.as_ref(), hit))
+#[cfg_attr(not(debug_assertions), inline(always))]
+fn next_seen<S: Simd>(ctx: &FrameContext<'_>, ray: &Ray, last: Option<&Hit>) -> Option<Hit> {
+    let after = last.map(Layer::new);
+    let rest = Ray { t_near: last.map_or(ray.t_near, |hit| hit.t), ..*ray };
+    ctx.world.closest_hit::<S, _>(&rest, &|hit: &Hit| is_seen(ctx, ray, after.as_ref(), hit))
 }
 
 /// The part of each probe's light that arrives.
 ///
 /// Blended layers dim it in order of (t, instance, prim), so that the product does not depend on the order in which a
 /// structure finds them.
-#[inline(always)]
-fn transmittances<S: Simd>(ctx: &FrameContext<'_>, probes: &[Probe]) -> [f32; LANES] {
+#[cfg_attr(not(debug_assertions), inline(always))]
+fn transmittances<S: Simd>(ctx: &FrameContext<'_>, probes: &Probes<S::F>) -> S::F {
+    let rays = probes.rays();
+    if !ctx.pierced {
+        let blocked = ctx.world.blocked::<S>(&rays[..S::F::LEN]);
+        return S::F::select(blocked, S::F::splat(0.0), S::F::splat(1.0));
+    }
+    let widths = row(probes.width);
     let mut arriving = [1.0; LANES];
-    if ctx.pierced {
-        for (arriving, probe) in arriving.iter_mut().zip(probes) {
-            let layers = Cell::new(Layers::default());
-            let stopped = ctx.world.is_occluded::<S, _>(&probe.ray, &|hit: &Hit| ctx.stops(probe.width, hit, &layers));
-            *arriving = if stopped { 0.0 } else { layers.into_inner().transmittance() };
-        }
-        return arriving;
+    for lane in Bits(probes.mask) {
+        let layers = Cell::new(Layers::default());
+        let width = widths[lane];
+        let stopped = ctx.world.is_occluded::<S, _>(&rays[lane], &|hit: &Hit| ctx.stops(width, hit, &layers));
+        arriving[lane] = if stopped { 0.0 } else { layers.into_inner().transmittance() };
     }
-    let mut rays = [Probe::NONE.ray; LANES];
-    for (ray, probe) in rays.iter_mut().zip(probes) {
-        *ray = probe.ray;
-    }
-    let blocked = ctx.world.blocked::<S>(&rays[..probes.len()]);
-    for (i, arriving) in arriving.iter_mut().enumerate() {
-        if (blocked >> i) & 1 == 1 {
-            *arriving = 0.0;
-        }
-    }
-    arriving
+    S::F::load(&arriving)
 }

@@ -10,9 +10,8 @@
 
 use std::{f32::consts::PI, sync::OnceLock};
 
-use glam::Vec3;
-
-use super::math::pow5;
+use super::wide::{Bits, Floats, LANES, One, Row, V3, clamp, only, pow5, row};
+use crate::simd::Lanes;
 
 /// Least perceptual roughness: a point light's highlight keeps a visible size.
 const LEAST_ROUGHNESS: f32 = 0.07;
@@ -21,37 +20,37 @@ const SIZE: usize = 32;
 
 /// A surface's reflectance.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Reflectance {
+pub(crate) struct Reflectance<F> {
     /// Diffuse albedo.
-    pub(crate) diffuse: Vec3,
+    pub(crate) diffuse: V3<F>,
     /// Reflectance at normal incidence.
-    pub(crate) f0: Vec3,
+    pub(crate) f0: V3<F>,
     /// Square of perceptual roughness.
-    pub(crate) alpha: f32,
+    pub(crate) alpha: F,
     /// Perceptual roughness.
-    pub(crate) roughness: f32,
+    pub(crate) roughness: F,
 }
 
 /// What depends on the view direction but not on the light, made once a shading point.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct View {
-    cos: f32,
+pub(crate) struct View<F> {
+    cos: F,
     /// Directional albedo of the specular layer.
-    specular: Vec3,
+    specular: V3<F>,
     /// Albedo of what lies below it.
-    diffuse: Vec3,
+    diffuse: V3<F>,
     /// Gain that makes up for scattering between microfacets.
-    gain: Vec3,
+    gain: V3<F>,
 }
 
-impl Reflectance {
+impl<F: Floats> Reflectance<F> {
     /// Of base colour, metalness and perceptual roughness, as glTF mixes them.
-    #[inline(always)]
-    pub(crate) fn new(base: Vec3, metallic: f32, roughness: f32) -> Self {
-        let roughness = roughness.clamp(LEAST_ROUGHNESS, 1.0);
-        let f0 = Vec3::splat(0.04);
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    pub(crate) fn new(base: V3<F>, metallic: F, roughness: F) -> Self {
+        let roughness = clamp(roughness, LEAST_ROUGHNESS, 1.0);
+        let f0 = V3::all(F::splat(0.04));
         Self {
-            diffuse: base * (1.0 - metallic),
+            diffuse: base * (F::splat(1.0) - metallic),
             f0: f0 + (base - f0) * metallic,
             alpha: roughness * roughness,
             roughness,
@@ -59,80 +58,104 @@ impl Reflectance {
     }
 
     /// The part that depends on the view alone; `cos` between view and shading normal, positive.
-    #[inline(always)]
-    pub(crate) fn view(&self, cos: f32) -> View {
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    pub(crate) fn view(&self, cos: F) -> View<F> {
+        let one = V3::all(F::splat(1.0));
         let split = albedo(cos, self.roughness);
-        let lost = 1.0 / (split[0] + split[1]).max(1e-3) - 1.0;
-        let gain = Vec3::ONE + self.f0 * lost;
-        let specular = (self.f0 * split[0] + split[1]) * gain;
-        View { cos, specular, diffuse: self.diffuse * (Vec3::ONE - specular).max(Vec3::ZERO), gain }
+        let lost = one.x / (split[0] + split[1]).max(F::splat(1e-3)) - one.x;
+        let gain = one + self.f0 * lost;
+        let specular = (self.f0 * split[0] + V3::all(split[1])).times(gain);
+        View { cos, specular, diffuse: self.diffuse.times((one - specular).max(V3::zero())), gain }
     }
 
     /// Reflected radiance a unit of irradiance facing the light, times the cosine: `f(v, l) * (n . l)`.
     ///
     /// `l` and `v` are unit; `n_l` is the clamped cosine between `n` and `l`.
-    #[inline(always)]
-    pub(crate) fn evaluate(&self, view: &View, n: Vec3, v: Vec3, l: Vec3, n_l: f32) -> Vec3 {
-        let h = (v + l) * (1.0 / (v + l).length().max(1e-6));
-        let (n_h, v_h) = (n.dot(h).clamp(0.0, 1.0), v.dot(h).clamp(0.0, 1.0));
-        let fresnel = self.f0 + (Vec3::ONE - self.f0) * pow5(1.0 - v_h);
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    pub(crate) fn evaluate(&self, view: &View<F>, n: V3<F>, v: V3<F>, l: V3<F>, n_l: F) -> V3<F> {
+        let one = F::splat(1.0);
+        let h = (v + l) * (one / (v + l).length().max(F::splat(1e-6)));
+        let (n_h, v_h) = (clamp(n.dot(h), 0.0, 1.0), clamp(v.dot(h), 0.0, 1.0));
+        let fresnel = self.f0 + (V3::all(one) - self.f0) * pow5(one - v_h);
         let specular = distribution(n_h, self.alpha) * visibility(view.cos, n_l, self.alpha);
-        (view.diffuse * (1.0 / PI) + fresnel * view.gain * specular) * n_l
+        (view.diffuse * F::splat(1.0 / PI) + fresnel.times(view.gain) * specular) * n_l
     }
 
     /// Light reflected from surroundings: `irradiance` over pi around the normal, `mirrored` around the
     /// reflected direction.
     #[inline(always)]
-    pub(crate) fn surroundings(view: &View, irradiance: Vec3, mirrored: Vec3) -> Vec3 {
-        view.diffuse * irradiance + view.specular * mirrored
+    pub(crate) fn surroundings(view: &View<F>, irradiance: V3<F>, mirrored: V3<F>) -> V3<F> {
+        view.diffuse.times(irradiance) + view.specular.times(mirrored)
     }
 }
 
 /// GGX distribution of normals.
-#[inline(always)]
-fn distribution(n_h: f32, alpha: f32) -> f32 {
+#[cfg_attr(not(debug_assertions), inline(always))]
+fn distribution<F: Floats>(n_h: F, alpha: F) -> F {
+    let one = F::splat(1.0);
     let a2 = alpha * alpha;
-    let d = n_h * n_h * (a2 - 1.0) + 1.0;
-    a2 / (PI * d * d)
+    let d = n_h * n_h * (a2 - one) + one;
+    a2 / (F::splat(PI) * d * d)
 }
 
 /// Smith's height-correlated masking and shadowing over `4 (n . l) (n . v)`.
-#[inline(always)]
-fn visibility(n_v: f32, n_l: f32, alpha: f32) -> f32 {
+#[cfg_attr(not(debug_assertions), inline(always))]
+fn visibility<F: Floats>(n_v: F, n_l: F, alpha: F) -> F {
+    let one = F::splat(1.0);
     let a2 = alpha * alpha;
-    let light = n_v * (n_l * n_l * (1.0 - a2) + a2).sqrt();
-    let view = n_l * (n_v * n_v * (1.0 - a2) + a2).sqrt();
-    0.5 / (light + view).max(1e-7)
+    let light = n_v * (n_l * n_l * (one - a2) + a2).sqrt();
+    let view = n_l * (n_v * n_v * (one - a2) + a2).sqrt();
+    F::splat(0.5) / (light + view).max(F::splat(1e-7))
 }
 
+/// Directional albedo by roughness (rows) and cosine (columns): scale and bias of `f0`.
+type Albedo = [[[f32; 2]; SIZE]; SIZE];
+
 /// Scale and bias of `f0` in the directional albedo, by cosine and roughness.
-#[inline(always)]
-fn albedo(cos: f32, roughness: f32) -> [f32; 2] {
-    static TABLE: OnceLock<Box<[[f32; 2]]>> = OnceLock::new();
-    let table = TABLE.get_or_init(albedo_table);
-    let at = |x: f32| {
-        let x = x.clamp(0.0, 1.0) * (SIZE - 1) as f32;
+#[cfg_attr(not(debug_assertions), inline(always))]
+fn albedo<F: Floats>(cos: F, roughness: F) -> [F; 2] {
+    static TABLE: OnceLock<Box<Albedo>> = OnceLock::new();
+    let table: &Albedo = TABLE.get_or_init(albedo_table);
+    let last = F::splat((SIZE - 1) as f32);
+    let (x, y) = (clamp(cos, 0.0, 1.0) * last, clamp(roughness, 0.0, 1.0) * last);
+    let (columns, rows) = (row(x), row(y));
+    let mut low = [[0.0; LANES]; 2];
+    // Entry by (row, column, scale or bias).
+    let mut entries = [[[[0.0; LANES]; 2]; 2]; 2];
+    for lane in Bits(F::ALL) {
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "within the table")]
-        let low = (x as usize).min(SIZE - 2);
-        (low, x - low as f32)
-    };
-    let ((i, a), (j, b)) = (at(cos), at(roughness));
-    let row = |j: usize, k: usize| {
-        let (low, high) = (table[j * SIZE + i][k], table[j * SIZE + i + 1][k]);
-        low + (high - low) * a
-    };
-    let cell = |k: usize| {
-        let (low, high) = (row(j, k), row(j + 1, k));
-        low + (high - low) * b
-    };
-    [cell(0), cell(1)]
+        let (i, j) = ((columns[lane] as usize).min(SIZE - 2), (rows[lane] as usize).min(SIZE - 2));
+        (low[0][lane], low[1][lane]) = (i as f32, j as f32);
+        for (up, entries) in entries.iter_mut().enumerate() {
+            for (right, entries) in entries.iter_mut().enumerate() {
+                let [scale, bias] = table[j + up][i + right];
+                (entries[0][lane], entries[1][lane]) = (scale, bias);
+            }
+        }
+    }
+    let (a, b) = (x - F::load(&low[0]), y - F::load(&low[1]));
+    [cell(&entries, 0, a, b), cell(&entries, 1, a, b)]
+}
+
+/// Blend of four entries of the table.
+#[cfg_attr(not(debug_assertions), inline(always))]
+fn cell<F: Floats>(entries: &[[[Row; 2]; 2]; 2], k: usize, a: F, b: F) -> F {
+    let [[low, high], [low2, high2]] = entries;
+    let (low, high) = (between(&low[k], &high[k], a), between(&low2[k], &high2[k], a));
+    low + (high - low) * b
+}
+
+#[inline(always)]
+fn between<F: Floats>(from: &Row, to: &Row, part: F) -> F {
+    let (low, high) = (F::load(from), F::load(to));
+    low + (high - low) * part
 }
 
 /// Rows of roughness, columns of cosine, from normals drawn by their visibility-free density.
-fn albedo_table() -> Box<[[f32; 2]]> {
+fn albedo_table() -> Box<Albedo> {
     const COUNT: u32 = 128;
-    let mut table = vec![[0.0; 2]; SIZE * SIZE].into_boxed_slice();
-    for (cell, out) in table.iter_mut().enumerate() {
+    let mut table = Box::new([[[0.0; 2]; SIZE]; SIZE]);
+    for (cell, out) in table.as_flattened_mut().iter_mut().enumerate() {
         let n_v = ((cell % SIZE) as f64 / (SIZE - 1) as f64).max(1e-3);
         let roughness = ((cell / SIZE) as f64 / (SIZE - 1) as f64).max(0.02);
         let alpha = roughness * roughness;
@@ -146,7 +169,8 @@ fn albedo_table() -> Box<[[f32; 2]]> {
             let n_l = 2.0 * v_h * h[1] - v[1];
             if n_l > 0.0 && v_h > 0.0 {
                 #[expect(clippy::cast_possible_truncation, reason = "a table of f32")]
-                let shadow = f64::from(visibility(n_v as f32, n_l as f32, alpha as f32)) * 4.0 * n_l * v_h / cos;
+                let [n_v, n_l32, alpha] = [n_v, n_l, alpha].map(|x| One::splat(x as f32));
+                let shadow = f64::from(only(visibility(n_v, n_l32, alpha))) * 4.0 * n_l * v_h / cos;
                 let x = 1.0 - v_h;
                 let fresnel = x * x * x * x * x;
                 scale += (1.0 - fresnel) * shadow;
@@ -163,13 +187,22 @@ fn albedo_table() -> Box<[[f32; 2]]> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::render::{math::frame, pattern::hash};
+    use crate::{
+        render::{math::frame, pattern::hash},
+        simd::Lanes,
+    };
+    use glam::Vec3;
+
+    /// A surface of one lane.
+    fn surface(base: Vec3, metallic: f32, roughness: f32) -> Reflectance<One> {
+        Reflectance::new(V3::splat(base), One::splat(metallic), One::splat(roughness))
+    }
 
     /// Mean of `f(v, l) (n . l)` over the hemisphere by uniform directions, times its solid angle.
-    fn reflected(surface: &Reflectance, cos: f32) -> Vec3 {
+    fn reflected(surface: &Reflectance<One>, cos: f32) -> Vec3 {
         let n = Vec3::Z;
         let v = Vec3::new((1.0 - cos * cos).sqrt(), 0.0, cos);
-        let view = surface.view(cos);
+        let view = surface.view(One::splat(cos));
         let side = 600u32;
         let mut sum = Vec3::ZERO;
         for i in 0..side * side {
@@ -177,7 +210,7 @@ mod tests {
             let phi = ((i / side) as f32 + 0.5) / side as f32 * 2.0 * PI;
             let r = (1.0 - z * z).sqrt();
             let l = Vec3::new(r * libm::cosf(phi), r * libm::sinf(phi), z);
-            sum += surface.evaluate(&view, n, v, l, z);
+            sum += surface.evaluate(&view, V3::splat(n), V3::splat(v), V3::splat(l), One::splat(z)).only();
         }
         sum * (2.0 * PI / (side * side) as f32)
     }
@@ -186,7 +219,7 @@ mod tests {
     fn a_white_metal_in_a_white_furnace_stays_white() {
         for roughness in [0.3, 0.5, 0.8, 1.0] {
             for cos in [0.3, 0.7, 1.0] {
-                let albedo = reflected(&Reflectance::new(Vec3::ONE, 1.0, roughness), cos).x;
+                let albedo = reflected(&surface(Vec3::ONE, 1.0, roughness), cos).x;
                 assert!((albedo - 1.0).abs() < 0.04, "roughness {roughness}, cosine {cos}: {albedo}");
             }
         }
@@ -196,7 +229,7 @@ mod tests {
     fn a_white_dielectric_gains_no_energy() {
         for roughness in [0.3, 0.6, 1.0] {
             for cos in [0.1, 0.5, 1.0] {
-                let albedo = reflected(&Reflectance::new(Vec3::ONE, 0.0, roughness), cos).x;
+                let albedo = reflected(&surface(Vec3::ONE, 0.0, roughness), cos).x;
                 assert!((0.85..1.03).contains(&albedo), "roughness {roughness}, cosine {cos}: {albedo}");
             }
         }
@@ -205,9 +238,10 @@ mod tests {
     #[test]
     fn surroundings_of_one_colour_reflect_as_one_colour() {
         for (metallic, roughness) in [(1.0, 0.2), (1.0, 1.0), (0.0, 0.4), (0.0, 1.0)] {
-            let surface = Reflectance::new(Vec3::ONE, metallic, roughness);
+            let surface = surface(Vec3::ONE, metallic, roughness);
             for cos in [0.05, 0.4, 1.0] {
-                let out = Reflectance::surroundings(&surface.view(cos), Vec3::ONE, Vec3::ONE).x;
+                let one = V3::splat(Vec3::ONE);
+                let out = only(Reflectance::surroundings(&surface.view(One::splat(cos)), one, one).x);
                 assert!((out - 1.0).abs() < 0.01, "{metallic} {roughness} {cos}: {out}");
             }
         }
@@ -215,7 +249,8 @@ mod tests {
 
     #[test]
     fn reflection_is_reciprocal_in_its_single_scattering_part() {
-        let surface = Reflectance { f0: Vec3::splat(0.5), diffuse: Vec3::ZERO, alpha: 0.25, roughness: 0.5 };
+        let half = One::splat(0.5);
+        let surface = Reflectance { f0: V3::all(half), diffuse: V3::zero(), alpha: One::splat(0.25), roughness: half };
         let direction = |i: u64| {
             let (t, b) = frame(Vec3::Z);
             let part = |k: u64| hash(i * 2 + k) as f32 / 4.3e9 * 1.2 - 0.6;
@@ -224,8 +259,10 @@ mod tests {
         for i in 0..100 {
             let (v, l) = (direction(i), direction(i + 1000));
             let plain = |a: Vec3, b: Vec3| {
-                let view = View { cos: a.z, specular: Vec3::ZERO, diffuse: Vec3::ZERO, gain: Vec3::ONE };
-                surface.evaluate(&view, Vec3::Z, a, b, b.z).x / b.z
+                let (cos, n_l) = (One::splat(a.z), One::splat(b.z));
+                let view = View { cos, specular: V3::zero(), diffuse: V3::zero(), gain: V3::splat(Vec3::ONE) };
+                let [n, a, l] = [Vec3::Z, a, b].map(V3::splat);
+                only(surface.evaluate(&view, n, a, l, n_l).x) / b.z
             };
             assert!((plain(v, l) - plain(l, v)).abs() < 1e-4 * plain(v, l).max(1.0));
         }

@@ -8,7 +8,7 @@ use super::{
 };
 use crate::{
     anim::{Pose, vertex_normal, vertex_tangent},
-    geom::{Hit, InstanceId, PrimId},
+    geom::{InstanceId, PrimId},
     scene::{MeshPart, PartInstance},
     world::World,
 };
@@ -69,11 +69,6 @@ impl<'a> FrameContext<'a> {
         &self.scene(info).materials[info.material as usize]
     }
 
-    #[inline(always)]
-    pub(crate) fn part(&self, info: &InstanceInfo) -> &'a MeshPart {
-        self.scene(info).scene.part(info.part)
-    }
-
     /// World-space corners and vertex numbers of a triangle.
     #[inline(always)]
     pub(crate) fn triangle(&self, instance: InstanceId, part: &MeshPart, prim: PrimId) -> ([u32; 3], [Vec3; 3]) {
@@ -89,9 +84,9 @@ impl<'a> FrameContext<'a> {
 
     /// World-space normal of a vertex; `None` when the part has none.
     #[inline(always)]
-    pub(crate) fn normal(&self, hit: &Hit, info: &InstanceInfo, vertex: u32) -> Option<Vec3> {
+    pub(crate) fn normal(&self, instance: InstanceId, info: &InstanceInfo, vertex: u32) -> Option<Vec3> {
         let make = || {
-            let normal = vertex_normal(&self.scene(info).scene, self.pose(hit.instance), info.part, vertex);
+            let normal = vertex_normal(&self.scene(info).scene, self.pose(instance), info.part, vertex);
             normal.map(|n| (n, 1.0))
         };
         self.normals.get(info.first_vertex + vertex as usize, make).map(|(n, _)| n)
@@ -99,8 +94,8 @@ impl<'a> FrameContext<'a> {
 
     /// World-space tangent of a vertex and the bitangent's sign; `None` when the part has none.
     #[inline(always)]
-    pub(crate) fn tangent(&self, hit: &Hit, info: &InstanceInfo, vertex: u32) -> Option<(Vec3, f32)> {
-        let make = || vertex_tangent(&self.scene(info).scene, self.pose(hit.instance), info.part, vertex);
+    pub(crate) fn tangent(&self, instance: InstanceId, info: &InstanceInfo, vertex: u32) -> Option<(Vec3, f32)> {
+        let make = || vertex_tangent(&self.scene(info).scene, self.pose(instance), info.part, vertex);
         self.tangents.get(info.first_vertex + vertex as usize, make)
     }
 }

@@ -3,7 +3,11 @@
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::tone::{Srgb8, filmic};
+use super::{
+    tone::{Srgb8, filmic},
+    wide::{LANES, V3, put3},
+};
+use crate::simd::{Lanes, Simd, SimdLevel, Task, dispatch};
 
 /// A picture being made: linear colour with coverage, depth and instance of the first surface. Rows top down.
 #[derive(Clone, Debug, Default)]
@@ -22,6 +26,8 @@ pub struct Film {
     /// True when `color` is meant for the display as it is (every shading but the lit ones): [`Film::to_srgb8`]
     /// then applies no tone curve.
     pub display: bool,
+    /// SIMD level that rendered it and encodes it.
+    pub(crate) simd: SimdLevel,
 }
 
 impl Film {
@@ -48,32 +54,57 @@ impl Film {
         rgba.resize(self.color.len() * 4, 255);
         let rows = (self.width as usize).max(1) * 8;
         let table = Srgb8::get();
+        let display = self.display;
         if rayon::current_thread_index().is_some() {
             rgba.par_chunks_mut(rows * 4)
                 .zip(self.color.par_chunks(rows))
-                .for_each(|(bytes, colors)| encode(table, self.display, colors, bytes));
+                .for_each(|(bytes, colors)| dispatch(self.simd, Encode { table, display, colors, bytes }));
         } else {
-            encode(table, self.display, &self.color, rgba);
+            dispatch(self.simd, Encode { table, display, colors: &self.color, bytes: rgba });
         }
     }
 }
 
 /// Encodes pixels; runs of one colour (the background) are encoded once.
-fn encode(table: &Srgb8, display: bool, colors: &[[f32; 4]], bytes: &mut [u8]) {
-    let mut last = ([0u32; 3], table_bytes(table, display, Vec3::ZERO));
-    for (color, out) in colors.iter().zip(bytes.chunks_exact_mut(4)) {
-        let key = [color[0].to_bits(), color[1].to_bits(), color[2].to_bits()];
-        if key != last.0 {
-            last = (key, table_bytes(table, display, Vec3::new(color[0], color[1], color[2])));
-        }
-        out.copy_from_slice(&last.1);
-    }
+struct Encode<'a> {
+    table: &'a Srgb8,
+    display: bool,
+    colors: &'a [[f32; 4]],
+    bytes: &'a mut [u8],
 }
 
-#[inline(always)]
-fn table_bytes(table: &Srgb8, display: bool, color: Vec3) -> [u8; 4] {
-    let shown = if display { color } else { filmic(color) };
-    [table.encode(shown.x), table.encode(shown.y), table.encode(shown.z), 255]
+impl Task for Encode<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self) {
+        // The last pixel's bits and its bytes.
+        let mut last = None;
+        for (colors, out) in self.colors.chunks(S::F::LEN).zip(self.bytes.chunks_mut(4 * S::F::LEN)) {
+            if let Some((bits, pixel)) = last
+                && colors.iter().all(|c| c.map(f32::to_bits) == bits)
+            {
+                out.as_chunks_mut().0.fill(pixel);
+                continue;
+            }
+            let mut rows = [[0.0; LANES]; 3];
+            for (lane, color) in colors.iter().enumerate() {
+                put3(&mut rows, lane & (LANES - 1), Vec3::new(color[0], color[1], color[2]));
+            }
+            if !self.display {
+                rows = filmic(V3::<S::F>::load(&rows)).rows();
+            }
+            let pixels = out.as_chunks_mut().0;
+            for (lane, pixel) in pixels.iter_mut().enumerate() {
+                let lane = lane & (LANES - 1);
+                let [r, g, b] = [rows[0][lane], rows[1][lane], rows[2][lane]];
+                *pixel = [self.table.encode(r), self.table.encode(g), self.table.encode(b), 255];
+            }
+            if let (Some(color), Some(&pixel)) = (colors.last(), pixels.last()) {
+                last = Some((color.map(f32::to_bits), pixel));
+            }
+        }
+    }
 }
 
 #[cfg(test)]

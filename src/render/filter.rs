@@ -4,10 +4,15 @@ use std::cell::Cell;
 
 use super::{
     context::{FrameContext, InstanceInfo},
-    material::Coverage,
-    surface::Patch,
+    found::{Maps, Spots},
+    material::{Channel, Coverage},
+    patch::Patch,
+    wide::{One, V3, only},
 };
-use crate::geom::{Hit, Ray};
+use crate::{
+    geom::{Hit, Ray},
+    simd::Lanes,
+};
 
 /// Place of a hit in the order of blending: least `t`, then instance, then triangle.
 type LayerKey = (f32, u32, u32);
@@ -52,33 +57,36 @@ pub(crate) fn is_seen(ctx: &FrameContext<'_>, ray: &Ray, after: Option<&Layer>, 
 #[inline(never)]
 fn is_seen_closer(ctx: &FrameContext<'_>, ray: &Ray, info: &InstanceInfo, hit: &Hit) -> bool {
     let material = ctx.material(info);
-    let patch = Patch::new(ctx, info, hit);
-    if !material.double_sided && (patch.cross.dot(ray.dir) > 0.0) != info.mirrored {
-        return false;
+    if !material.double_sided {
+        let part = ctx.scene(info).scene.part(info.part);
+        let (_, [a, b, c]) = ctx.triangle(hit.instance, part, hit.prim);
+        if ((b - a).cross(c - a).dot(ray.dir) > 0.0) != info.mirrored {
+            return false;
+        }
     }
-    match material.coverage {
-        Coverage::Mask(cutoff) => alpha(ctx, info, &patch.with_steps(ctx, ray, hit.t)) >= cutoff,
-        Coverage::Opaque => true,
-        Coverage::Blend if ctx.settings.shading.is_lit() => true,
-        // Without blending, what is mostly there is drawn.
-        Coverage::Blend => alpha(ctx, info, &patch.with_steps(ctx, ray, hit.t)) >= 0.5,
-    }
+    // Without blending, what is mostly there is drawn.
+    let cutoff = match material.coverage {
+        Coverage::Mask(cutoff) => cutoff,
+        Coverage::Blend if !ctx.settings.shading.is_lit() => 0.5,
+        Coverage::Opaque | Coverage::Blend => return true,
+    };
+    let spots = Spots::new(ctx, &[Some(*hit)]);
+    let patch = spots.patch::<One>();
+    alpha(&spots, &patch.with_steps(&ctx.rays, V3::splat(ray.dir), spots.t())) >= cutoff
 }
 
-/// Alpha of the surface at `patch`: factor, texture and vertex colour.
-fn alpha(ctx: &FrameContext<'_>, info: &InstanceInfo, patch: &Patch<'_>) -> f32 {
-    let material = ctx.material(info);
-    let mut alpha = material.base.w;
-    if let Some(binding) = &material.base_map {
-        let (uv, footprint) = patch.coordinates(binding.set);
-        alpha *= binding.read(&ctx.scene(info).pyramids, uv, &footprint).w;
+/// Alpha of the one surface of `spots` at `patch`: factor, texture and vertex colour.
+fn alpha(spots: &Spots<'_>, patch: &Patch<One>) -> f32 {
+    let mut alpha = spots.number::<One>(|spot| spot.material.base.w);
+    let mut maps = Maps::new(spots, patch);
+    if let Some(placed) = maps.place(Channel::Base) {
+        alpha = alpha * maps.read(&placed)[3];
     }
-    if !patch.part.colors.is_empty() {
-        let [a, b, c] = patch.vertices.map(|i| patch.part.colors[i as usize].w);
-        let [w, u, v] = patch.weights;
-        alpha *= a * w + b * u + c * v;
+    let (colored, color) = spots.colors(patch);
+    if colored != 0 {
+        alpha = alpha * color[3];
     }
-    alpha
+    only(alpha)
 }
 
 /// Most blended layers that a secondary ray keeps; more are dark enough.
@@ -126,7 +134,8 @@ impl FrameContext<'_> {
 
     #[inline(never)]
     fn stops_partly(&self, info: &InstanceInfo, width: f32, hit: &Hit, layers: &Cell<Layers>) -> bool {
-        let alpha = alpha(self, info, &Patch::new(self, info, hit).with_width(width));
+        let spots = Spots::new(self, &[Some(*hit)]);
+        let alpha = alpha(&spots, &spots.patch::<One>().with_width(One::splat(width)));
         match self.material(info).coverage {
             Coverage::Opaque => true,
             Coverage::Mask(cutoff) => alpha >= cutoff,

@@ -2,10 +2,14 @@
 
 use glam::Vec3;
 
-use super::math::{frame, luminance, unit_or};
+use super::{
+    math::{frame, luminance, unit_or},
+    wide::{Floats, One, Row, V2, V3, clamp, only},
+};
 use crate::{
     anim::Pose,
     scene::{LightKind, NodeId, Scene},
+    simd::Lanes,
 };
 
 /// A light placed in the world.
@@ -36,15 +40,17 @@ enum Kind {
     },
 }
 
-/// Light arriving at a point.
+/// Light arriving at points.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Incident {
+pub(crate) struct Incident<F> {
+    /// Lanes that light reaches.
+    pub(crate) mask: u32,
     /// Unit direction towards the light.
-    pub(crate) dir: Vec3,
+    pub(crate) dir: V3<F>,
     /// Irradiance on a surface that faces the light.
-    pub(crate) level: Vec3,
+    pub(crate) level: V3<F>,
     /// Distance to the light; infinite for directional lights.
-    pub(crate) distance: f32,
+    pub(crate) distance: F,
 }
 
 impl LightSource {
@@ -82,38 +88,46 @@ impl LightSource {
         })
     }
 
-    /// Light that reaches `p`; `disc` is a point of the unit disc that picks a spot on lights with a size.
-    #[inline(always)]
-    pub(crate) fn incident(&self, p: Vec3, disc: (f32, f32)) -> Option<Incident> {
+    /// Light that reaches the points `p`; `disc` holds points of the unit disc that pick a spot on lights with a size.
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    pub(crate) fn incident<F: Floats>(&self, p: V3<F>, disc: Option<&[Row; 2]>) -> Incident<F> {
         if let Kind::Directional { spread } = self.kind {
-            let mut dir = self.to_light;
-            if spread > 0.0 && disc != (0.0, 0.0) {
-                let (a, b) = frame(dir);
-                dir = unit_or(dir + (a * disc.0 + b * disc.1) * spread, dir);
+            let mut dir = V3::splat(self.to_light);
+            if let Some(disc) = disc.filter(|_| spread > 0.0) {
+                let disc = V2::<F>::load(disc);
+                let (a, b) = frame(self.to_light);
+                let spot = (V3::splat(a) * disc.x + V3::splat(b) * disc.y) * F::splat(spread);
+                dir = (dir + spot).unit_or(dir);
             }
-            return Some(Incident { dir, level: self.intensity, distance: f32::INFINITY });
+            return Incident { mask: F::ALL, dir, level: V3::splat(self.intensity), distance: F::splat(f32::INFINITY) };
         }
-        let towards = self.position - p;
+        let (zero, one) = (F::splat(0.0), F::splat(1.0));
+        let towards = V3::splat(self.position) - p;
         let distance2 = towards.length_squared();
         let distance = distance2.sqrt();
-        let dir = towards / distance;
-        let mut level = self.intensity / distance2;
+        let dir = towards.over(distance);
+        let mut level = V3::splat(self.intensity).over(distance2);
         if self.inv_range > 0.0 {
-            let part = distance * self.inv_range;
+            let part = distance * F::splat(self.inv_range);
             let part2 = part * part;
-            level *= (1.0 - part2 * part2).clamp(0.0, 1.0);
+            level = level * clamp(one - part2 * part2, 0.0, 1.0);
         }
         if let Kind::Spot { inner, outer } = self.kind {
-            let cos = dir.dot(self.to_light);
-            let edge = ((cos - outer) / (inner - outer).max(1e-4)).clamp(0.0, 1.0);
-            level *= edge * edge;
+            let cos = dir.dot(V3::splat(self.to_light));
+            let edge = clamp((cos - F::splat(outer)) / F::splat((inner - outer).max(1e-4)), 0.0, 1.0);
+            level = level * (edge * edge);
         }
-        (level.max_element() > 0.0 && level.is_finite()).then_some(Incident { dir, level, distance })
+        let brightest = level.max_element();
+        Incident { mask: zero.lt(brightest) & brightest.lt(F::splat(f32::INFINITY)), dir, level, distance }
     }
 
     /// Irradiance (luminance) on a surface at `p` with unit normal `n`, either side.
     pub(crate) fn irradiance(&self, p: Vec3, n: Vec3) -> f32 {
-        self.incident(p, (0.0, 0.0)).map_or(0.0, |i| luminance(i.level) * i.dir.dot(n).abs())
+        let incident = self.incident(V3::<One>::splat(p), None);
+        if incident.mask == 0 {
+            return 0.0;
+        }
+        luminance(incident.level.only()) * only(incident.dir.dot(V3::splat(n)).abs())
     }
 
     /// True for lights with a size, whose shadows soften with more samples.
@@ -126,12 +140,10 @@ impl LightSource {
 ///
 /// # Source
 /// Chiang, Li and Burley, "Taming the Shadow Terminator", 2019.
-#[inline(always)]
-pub(crate) fn terminator(geom_cos: f32, shade_cos: f32, between: f32) -> f32 {
-    if geom_cos <= 0.0 {
-        return 0.0;
-    }
-    let g = (geom_cos / (shade_cos * between).max(1e-6)).min(1.0);
+#[cfg_attr(not(debug_assertions), inline(always))]
+pub(crate) fn terminator<F: Floats>(geom_cos: F, shade_cos: F, between: F) -> F {
+    let one = F::splat(1.0);
+    let g = (geom_cos / (shade_cos * between).max(F::splat(1e-6))).min(one);
     // -g^3 + g^2 + g
-    g * (1.0 + g * (1.0 - g))
+    F::select(F::splat(0.0).lt(geom_cos), g * (one + g * (one - g)), F::splat(0.0))
 }

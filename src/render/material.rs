@@ -2,39 +2,29 @@
 
 use glam::{Vec2, Vec3, Vec4};
 
-use super::texture::{Encoding, Footprint, Pyramid, sample};
+use super::texture::{Encoding, Pyramid};
 use crate::scene::{AlphaMode, Material, MeshPart, Scene, TexSampler, TextureRef};
 
 /// A texture bound to a material: pyramid, sampling, coordinate set and their transform.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Binding {
-    pyramid: u32,
-    sampler: TexSampler,
+    pub(crate) pyramid: u32,
+    pub(crate) sampler: TexSampler,
     /// TEXCOORD set.
     pub(crate) set: u32,
-    /// Rows of the 2 x 2 matrix, then the offset.
-    rows: [Vec2; 2],
-    offset: Vec2,
+    /// Rows of the 2 x 2 matrix that takes file coordinates to the texture's, then the offset.
+    pub(crate) rows: [Vec2; 2],
+    pub(crate) offset: Vec2,
 }
 
-impl Binding {
-    /// Where the texture is read for file coordinates `uv`.
-    #[inline(always)]
-    fn place(&self, uv: Vec2) -> Vec2 {
-        self.turn(uv) + self.offset
-    }
-
-    /// [`Binding::place`] for differences.
-    #[inline(always)]
-    pub(crate) fn turn(&self, uv: Vec2) -> Vec2 {
-        Vec2::new(self.rows[0].x * uv.x + self.rows[0].y * uv.y, self.rows[1].x * uv.x + self.rows[1].y * uv.y)
-    }
-
-    /// The filtered texel at file coordinates `uv`.
-    pub(crate) fn read(&self, pyramids: &[Pyramid], uv: Vec2, footprint: &Footprint) -> Vec4 {
-        let footprint = Footprint { dx: self.turn(footprint.dx), dy: self.turn(footprint.dy) };
-        sample(&pyramids[self.pyramid as usize], self.sampler, self.place(uv), &footprint)
-    }
+/// What of a material a texture scales.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Channel {
+    Base,
+    Rough,
+    Normal,
+    Occlusion,
+    Emissive,
 }
 
 /// How a surface treats rays that meet it.
@@ -60,22 +50,21 @@ pub(crate) struct ShadeMaterial {
     pub(crate) coverage: Coverage,
     pub(crate) double_sided: bool,
     pub(crate) unlit: bool,
-    pub(crate) base_map: Option<Binding>,
-    pub(crate) rough_map: Option<Binding>,
-    pub(crate) normal_map: Option<Binding>,
-    pub(crate) occlusion_map: Option<Binding>,
-    pub(crate) emissive_map: Option<Binding>,
+    /// By [`Channel`].
+    maps: [Option<Binding>; 5],
 }
 
 impl ShadeMaterial {
+    /// The texture of a channel.
+    #[inline(always)]
+    pub(crate) fn map(&self, channel: Channel) -> Option<&Binding> {
+        self.maps[channel as usize].as_ref()
+    }
+
     /// True when nothing is read at texture coordinates.
     #[inline(always)]
     pub(crate) fn is_plain(&self) -> bool {
-        self.base_map.is_none()
-            && self.rough_map.is_none()
-            && self.normal_map.is_none()
-            && self.occlusion_map.is_none()
-            && self.emissive_map.is_none()
+        self.maps.iter().all(Option::is_none)
     }
 }
 
@@ -139,15 +128,17 @@ impl<'a> MaterialMaker<'a> {
             },
             double_sided: m.double_sided,
             unlit: m.unlit,
-            base_map: self.bind(m.base_color_texture.as_ref(), Encoding::Srgb, true),
-            rough_map: self.bind(
-                m.metallic_roughness_texture.as_ref(),
-                Encoding::Linear,
-                lit && (m.metallic > 0.0 || m.roughness > 0.0),
-            ),
-            normal_map: self.bind(m.normal_texture.as_ref(), Encoding::Linear, lit),
-            occlusion_map: self.bind(m.occlusion_texture.as_ref(), Encoding::Linear, lit && m.occlusion_strength > 0.0),
-            emissive_map: self.bind(m.emissive_texture.as_ref(), Encoding::Srgb, lit && m.emissive.max_element() > 0.0),
+            maps: [
+                self.bind(m.base_color_texture.as_ref(), Encoding::Srgb, true),
+                self.bind(
+                    m.metallic_roughness_texture.as_ref(),
+                    Encoding::Linear,
+                    lit && (m.metallic > 0.0 || m.roughness > 0.0),
+                ),
+                self.bind(m.normal_texture.as_ref(), Encoding::Linear, lit),
+                self.bind(m.occlusion_texture.as_ref(), Encoding::Linear, lit && m.occlusion_strength > 0.0),
+                self.bind(m.emissive_texture.as_ref(), Encoding::Srgb, lit && m.emissive.max_element() > 0.0),
+            ],
         }
     }
 }

@@ -16,19 +16,6 @@ pub(crate) fn log2(x: f32) -> f32 {
     exponent + z * (2.885_39 + z2 * (0.961_796_7 + z2 * (0.577_078_04 + z2 * 0.412_198_6)))
 }
 
-/// The largest whole number not above `x`; `x` itself beyond 2^23; 0 for NaN.
-///
-/// The standard library's version is a call where the target has no rounding instruction.
-#[inline(always)]
-pub(crate) fn floor(x: f32) -> f32 {
-    if x.abs() >= 8_388_608.0 {
-        return x;
-    }
-    #[expect(clippy::cast_possible_truncation, reason = "below 2^23")]
-    let towards_zero = x as i32 as f32;
-    if towards_zero > x { towards_zero - 1.0 } else { towards_zero }
-}
-
 /// `(sin x, cos x)` for `x` in `[-pi/4, pi/4]`, within 4e-7 (Taylor polynomials).
 #[inline(always)]
 pub(crate) fn sin_cos_quarter(x: f32) -> (f32, f32) {
@@ -79,13 +66,6 @@ pub(crate) fn unit_or(v: Vec3, or: Vec3) -> Vec3 {
     if length >= 1.0 && length.is_finite() { scaled / length } else { or }
 }
 
-/// `x` raised to the fifth.
-#[inline(always)]
-pub(crate) fn pow5(x: f32) -> f32 {
-    let x2 = x * x;
-    x2 * x2 * x
-}
-
 /// Blend of `a` and `b`.
 #[inline(always)]
 pub(crate) fn mix(a: Vec3, b: Vec3, s: f32) -> Vec3 {
@@ -116,16 +96,6 @@ mod tests {
             let exact = libm::log2(f64::from(x));
             assert!((f64::from(log2(x)) - exact).abs() < 5e-5, "{x}: {} {exact}", log2(x));
         }
-    }
-
-    #[test]
-    fn floor_is_the_floor() {
-        for bits in (0..=u32::MAX).step_by(65_521) {
-            let x = f32::from_bits(bits);
-            assert!(floor(x) == x.floor() || x.is_nan(), "{x}");
-        }
-        assert_eq!(floor(-0.5), -1.0);
-        assert_eq!(floor(f32::NAN), 0.0);
     }
 
     #[test]

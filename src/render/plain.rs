@@ -4,13 +4,14 @@ use glam::Vec3;
 
 use super::{
     Shading,
-    block::Probe,
     context::FrameContext,
+    found::Spots,
     math::{disc, frame},
     pattern::PixelSampler,
-    surface::{Patch, Surface},
+    probe::{Points, Probes},
+    surface::Surface,
+    wide::{Bits, Floats, LANES, V3, clamp, put3, row},
 };
-use crate::geom::{Hit, Ray};
 
 /// Occlusion rays a sample.
 const AO_RAYS: u32 = 4;
@@ -19,59 +20,90 @@ const CLAY: Vec3 = Vec3::new(0.86, 0.84, 0.80);
 /// Purpose number of the pattern over the hemisphere.
 const AO_PATTERN: u32 = 0;
 
-/// A point without material: its display colour, and what occlusion rays start from.
+/// Points without material: their display colours, and what occlusion rays start from.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct PlainPoint {
-    pub(crate) color: Vec3,
-    surface: Option<Surface>,
+pub(crate) struct PlainPoints<'s, F> {
+    color: V3<F>,
+    surface: &'s Surface<F>,
+    mask: u32,
 }
 
-impl PlainPoint {
-    /// Secondary rays a point of a shading.
-    pub(crate) fn probe_count(shading: Shading) -> usize {
-        if shading == Shading::Ao { AO_RAYS as usize } else { 0 }
-    }
+/// Secondary rays a point of a shading.
+pub(crate) fn probe_count(shading: Shading) -> usize {
+    if shading == Shading::Ao { AO_RAYS as usize } else { 0 }
+}
 
-    /// What `ray` sees at `hit`; ambient occlusion begins black.
-    pub(crate) fn new(ctx: &FrameContext<'_>, ray: &Ray, hit: &Hit) -> Self {
-        if ctx.settings.shading == Shading::Depth {
-            return Self { color: Vec3::splat(depth(ctx.depth_range, hit.t)), surface: None };
-        }
-        let info = ctx.info(hit.instance);
-        let mut patch = Patch::new(ctx, info, hit);
-        if ctx.material(info).normal_map.is_some() {
-            patch = patch.with_steps(ctx, ray, hit.t);
-        }
-        let surface = Surface::new(ctx, info, &patch, ray, hit);
+impl<'s, F: Floats> PlainPoints<'s, F> {
+    /// The points of `surface`, which lies at `spots`; ambient occlusion begins black.
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    pub(crate) fn new(ctx: &FrameContext<'_>, spots: &Spots<'_>, surface: &'s Surface<F>) -> Self {
         let color = match ctx.settings.shading {
-            Shading::Normals => encoded_normal(surface.n_shade),
-            Shading::Ao => Vec3::ZERO,
-            _ => CLAY * surface.n_shade.dot(surface.view).clamp(0.0, 1.0),
+            Shading::Depth => {
+                let mut grey = row(spots.t::<F>());
+                for lane in Bits(spots.mask) {
+                    grey[lane] = depth(ctx.depth_range, grey[lane]);
+                }
+                V3::all(F::load(&grey))
+            }
+            Shading::Normals => {
+                let mut rows = surface.n_shade.rows();
+                for lane in Bits(spots.mask) {
+                    for row in &mut rows {
+                        row[lane] = encoded(row[lane]);
+                    }
+                }
+                V3::load(&rows)
+            }
+            Shading::Ao => V3::zero(),
+            _ => V3::splat(CLAY) * clamp(surface.n_shade.dot(surface.view), 0.0, 1.0),
         };
-        Self { color, surface: Some(surface) }
-    }
-
-    /// Occlusion ray `number`, drawn from the cosine-weighted hemisphere within the context's reach.
-    pub(crate) fn probe(&self, ctx: &FrameContext<'_>, number: usize, random: &PixelSampler) -> Option<Probe> {
-        let surface = self.surface.as_ref()?;
-        let n = surface.n_shade;
-        let (a, b) = frame(n);
-        #[expect(clippy::cast_possible_truncation, reason = "a handful of rays")]
-        let (u, v) = random.square(AO_PATTERN, number as u32, AO_RAYS);
-        let (x, y) = disc(u, v);
-        let mut dir = a * x + b * y + n * (1.0 - x * x - y * y).max(0.0).sqrt();
-        // Directions below the facet are mirrored to its upper side.
-        dir -= surface.n_geom * (2.0 * dir.dot(surface.n_geom).min(0.0));
-        let ray = Ray { origin: surface.origin(dir), dir, t_near: 0.0, t_far: ctx.reach };
-        Some(Probe { ray, light: Vec3::splat(1.0 / AO_RAYS as f32), width: 0.0 })
+        Self { color, surface, mask: spots.mask }
     }
 }
 
-/// Components of [-1, 1] as sRGB codes 0 to 255, so that a file's bytes are the normal.
+impl<F: Floats> Points<F> for PlainPoints<'_, F> {
+    /// Occlusion rays `number`, drawn from the cosine-weighted hemisphere within the context's reach.
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    fn probes(&self, ctx: &FrameContext<'_>, number: usize, random: &[PixelSampler; LANES]) -> Probes<F> {
+        let normals = self.surface.n_shade.rows();
+        let mut rows = [[0.0; LANES]; 3];
+        for lane in Bits(self.mask) {
+            let n = Vec3::new(normals[0][lane], normals[1][lane], normals[2][lane]);
+            let (a, b) = frame(n);
+            #[expect(clippy::cast_possible_truncation, reason = "a handful of rays")]
+            let (u, v) = random[lane].square(AO_PATTERN, number as u32, AO_RAYS);
+            let (x, y) = disc(u, v);
+            put3(&mut rows, lane, a * x + b * y + n * (1.0 - x * x - y * y).max(0.0).sqrt());
+        }
+        let (dir, n_geom) = (V3::load(&rows), self.surface.n_geom);
+        // Directions below the facet are mirrored to its upper side.
+        let below = dir.dot(n_geom).min(F::splat(0.0));
+        let dir = dir - n_geom * (F::splat(2.0) * below);
+        Probes {
+            mask: self.mask,
+            origin: self.surface.origin(dir),
+            dir,
+            t_far: F::splat(ctx.reach),
+            light: V3::all(F::splat(1.0 / AO_RAYS as f32)),
+            width: F::splat(0.0),
+        }
+    }
+
+    #[inline(always)]
+    fn add(&mut self, mask: u32, light: V3<F>) {
+        self.color = V3::select(mask, self.color + light, self.color);
+    }
+
+    #[inline(always)]
+    fn result(&self) -> (V3<F>, F) {
+        (self.color, F::splat(1.0))
+    }
+}
+
+/// A component in [-1, 1] as sRGB code 0 to 255, so that a file's bytes are the normal.
 #[inline(always)]
-fn encoded_normal(n: Vec3) -> Vec3 {
-    let channel = |x: f32| super::tone::linear_of((x * 0.5 + 0.5).clamp(0.0, 1.0));
-    Vec3::new(channel(n.x), channel(n.y), channel(n.z))
+fn encoded(x: f32) -> f32 {
+    super::tone::linear_of((x * 0.5 + 0.5).clamp(0.0, 1.0))
 }
 
 /// White at the nearest depth of the scene, dark grey at the farthest.
@@ -97,7 +129,7 @@ mod tests {
     #[test]
     fn normals_are_stored_as_plain_codes() {
         let table = super::super::tone::Srgb8::get();
-        let code = |x: f32| table.encode(encoded_normal(Vec3::new(x, 0.0, 0.0)).x);
+        let code = |x: f32| table.encode(encoded(x));
         assert_eq!((code(-1.0), code(0.0), code(1.0)), (0, 128, 255));
         assert_eq!(code(0.5), 191);
     }

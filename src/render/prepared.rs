@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::{
     exposure,
-    material::{Coverage, MaterialMaker, ShadeMaterial},
+    material::{Channel, Coverage, MaterialMaker, ShadeMaterial},
     texture::Pyramid,
 };
 use crate::scene::{Material, NodeId, Scene};
@@ -48,7 +48,7 @@ impl PreparedScene {
 
     /// True when some material reads a normal map, for which tangents are asked.
     pub(crate) fn has_tangents(&self) -> bool {
-        self.materials.iter().any(|m| m.normal_map.is_some())
+        self.materials.iter().any(|m| m.map(Channel::Normal).is_some())
     }
 
     /// Bytes that texture pyramids take beside the scene's own images.

@@ -2,11 +2,14 @@
 
 use glam::{DAffine3, DVec3, Vec3};
 
-use super::{CameraView, camera::corners};
-use crate::{
-    geom::{Aabb, Ray},
-    scene::Projection,
+use super::{
+    CameraView,
+    camera::corners,
+    wide::{Floats, V3},
 };
+#[cfg(test)]
+use crate::geom::Ray;
+use crate::{geom::Aabb, scene::Projection};
 
 /// Makes the ray through any point of the picture. A ray's `t` is the distance along the view axis.
 ///
@@ -47,7 +50,7 @@ impl RayMaker {
     }
 
     /// The ray through picture point (`x`, `y`), in pixels from the upper left corner.
-    #[inline(always)]
+    #[cfg(test)]
     pub(crate) fn ray(&self, x: f32, y: f32) -> Ray {
         Ray {
             origin: self.origin[0] + self.origin[1] * x + self.origin[2] * y,
@@ -57,11 +60,26 @@ impl RayMaker {
         }
     }
 
+    /// Origins and directions of the rays through the picture points (`x`, `y`), in pixels from the upper left corner.
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    pub(crate) fn lines<F: Floats>(&self, x: F, y: F) -> [V3<F>; 2] {
+        let [o, right, down] = self.origin;
+        let origin = V3::splat(o) + V3::splat(right) * x + V3::splat(down) * y;
+        let [d, right, down] = self.dir;
+        [origin, V3::splat(d) + V3::splat(right) * x + V3::splat(down) * y]
+    }
+
+    /// The range of `t` of every ray.
+    #[inline(always)]
+    pub(crate) fn range(&self) -> [f32; 2] {
+        [self.t_near, self.t_far]
+    }
+
     /// How far the point at parameter `t` moves for one pixel to the right and one down, the plane's tilt
     /// not yet counted.
-    #[inline(always)]
-    pub(crate) fn pixel_steps(&self, t: f32) -> [Vec3; 2] {
-        [self.origin[1] + self.dir[1] * t, self.origin[2] + self.dir[2] * t]
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    pub(crate) fn pixel_steps<F: Floats>(&self, t: F) -> [V3<F>; 2] {
+        [V3::splat(self.origin[1]) + V3::splat(self.dir[1]) * t, V3::splat(self.origin[2]) + V3::splat(self.dir[2]) * t]
     }
 
     /// The pixels that `bounds` can cover, as `[x0, y0, x1, y1)`; everything when part of it lies behind the camera.

@@ -115,6 +115,7 @@ impl Renderer {
     ) -> Option<u64> {
         film.resize(film.width, film.height);
         film.display = !settings.shading.is_lit();
+        film.simd = settings.simd;
         if film.color.is_empty() {
             return Some(0);
         }

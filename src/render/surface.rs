@@ -1,16 +1,13 @@
-//! From a hit to a surface point: position with its error, normals, texture footprints.
+//! From hits to surface points: positions with their errors, normals.
 
-use glam::{Vec2, Vec3};
+use glam::Vec3;
 
 use super::{
-    context::{FrameContext, InstanceInfo},
-    material::{Binding, tex_coord},
-    math::unit_or,
-    texture::Footprint,
-};
-use crate::{
-    geom::{Hit, Ray},
-    scene::MeshPart,
+    context::FrameContext,
+    found::{Maps, Placed, Spots},
+    material::Channel,
+    patch::Patch,
+    wide::{Floats, V3, row},
 };
 
 /// Least share that an axis has of the largest error: on a coordinate plane the error is 0, and a ray that starts a
@@ -20,172 +17,96 @@ const LEAST_ERROR: f32 = 1.0 / 256.0;
 /// Bound of the relative rounding error of a barycentric point: seven roundings.
 const POINT_ERROR: f32 = 7.0 * 0.5 * f32::EPSILON / (1.0 - 7.0 * 0.5 * f32::EPSILON);
 
-/// A triangle as a ray meets it: what texture look-ups need, without normals.
+/// Surface points ready for shading, a lane each.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Patch<'a> {
-    pub(crate) part: &'a MeshPart,
-    pub(crate) vertices: [u32; 3],
-    pub(crate) corners: [Vec3; 3],
-    /// Weights of the corners.
-    pub(crate) weights: [f32; 3],
-    /// Cross product of the edges: normal of the file's winding times twice the area.
-    pub(crate) cross: Vec3,
-    /// Change of the weights of the second and third corner for one pixel right and one down.
-    steps: [Vec2; 2],
-}
-
-impl<'a> Patch<'a> {
-    /// The triangle of `hit`; its footprint is unknown until [`Patch::with_steps`].
-    #[inline(always)]
-    pub(crate) fn new(ctx: &FrameContext<'a>, info: &InstanceInfo, hit: &Hit) -> Self {
-        let part = ctx.part(info);
-        let (vertices, corners) = ctx.triangle(hit.instance, part, hit.prim);
-        let cross = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
-        let weights = [1.0 - hit.u - hit.v, hit.u, hit.v];
-        Self { part, vertices, corners, weights, cross, steps: [Vec2::ZERO; 2] }
-    }
-
-    /// Sets the footprint that a pixel of the camera's picture has here.
-    ///
-    /// # Source
-    /// Igehy, "Tracing Ray Differentials", 1999, section 3.1: the transfer to the plane.
-    #[inline(always)]
-    #[must_use]
-    pub(crate) fn with_steps(mut self, ctx: &FrameContext<'_>, ray: &Ray, t: f32) -> Self {
-        let slope = 1.0 / self.cross.dot(ray.dir);
-        let pixel = ctx.rays.pixel_steps(t);
-        self.steps = pixel.map(|q| self.weight_change(q - ray.dir * (q.dot(self.cross) * slope)));
-        self
-    }
-
-    /// Sets a round footprint `width` across, in metres.
-    #[inline(always)]
-    #[must_use]
-    pub(crate) fn with_width(mut self, width: f32) -> Self {
-        let edge = unit_or(self.corners[1] - self.corners[0], Vec3::X);
-        let other = unit_or(self.cross.cross(edge), Vec3::Y);
-        self.steps = [self.weight_change(edge * width), self.weight_change(other * width)];
-        self
-    }
-
-    /// Change of the second and third weight for a step `d` in the triangle's plane.
-    #[inline(always)]
-    fn weight_change(&self, d: Vec3) -> Vec2 {
-        let inv = 1.0 / self.cross.length_squared();
-        let (e1, e2) = (self.corners[1] - self.corners[0], self.corners[2] - self.corners[0]);
-        Vec2::new(d.cross(e2).dot(self.cross) * inv, e1.cross(d).dot(self.cross) * inv)
-    }
-
-    /// Coordinates of a TEXCOORD set here and their footprint.
-    #[inline(always)]
-    pub(crate) fn coordinates(&self, set: u32) -> (Vec2, Footprint) {
-        let [a, b, c] = tex_coord(self.part, set, self.vertices);
-        let [w, u, v] = self.weights;
-        let (du, dv) = (b - a, c - a);
-        let step = |s: Vec2| du * s.x + dv * s.y;
-        (a * w + b * u + c * v, Footprint { dx: step(self.steps[0]), dy: step(self.steps[1]) })
-    }
-
-    /// Width of the footprint in metres: the longer of its two steps.
-    #[inline(always)]
-    pub(crate) fn width(&self) -> f32 {
-        let (e1, e2) = (self.corners[1] - self.corners[0], self.corners[2] - self.corners[0]);
-        let step = |s: Vec2| (e1 * s.x + e2 * s.y).length_squared();
-        step(self.steps[0]).max(step(self.steps[1])).sqrt()
-    }
-
-    /// Directions of growing u and of falling v (a normal map's x and y) of a binding's coordinates; `None` where
-    /// they do not span the plane.
-    #[inline(always)]
-    fn tangents(&self, binding: &Binding) -> Option<(Vec3, Vec3)> {
-        let [a, b, c] = tex_coord(self.part, binding.set, self.vertices);
-        let (du, dv) = (binding.turn(b - a), binding.turn(c - a));
-        let (e1, e2) = (self.corners[1] - self.corners[0], self.corners[2] - self.corners[0]);
-        let det = du.x * dv.y - dv.x * du.y;
-        let sign = if det < 0.0 { -1.0 } else { 1.0 };
-        let tangent = (e1 * dv.y - e2 * du.y) * sign;
-        let bitangent = (e1 * dv.x - e2 * du.x) * sign;
-        (det != 0.0 && det.is_finite()).then_some((tangent, bitangent))
-    }
-}
-
-/// A surface point ready for shading.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Surface {
-    pub(crate) point: Vec3,
+pub(crate) struct Surface<F> {
+    pub(crate) point: V3<F>,
     /// Bound of the error of `point` along each axis.
-    error: Vec3,
+    error: V3<F>,
     /// Unit geometric normal on the viewer's side.
-    pub(crate) n_geom: Vec3,
+    pub(crate) n_geom: V3<F>,
     /// Unit shading normal on the viewer's side, never turned away from the viewer.
-    pub(crate) n_shade: Vec3,
+    pub(crate) n_shade: V3<F>,
     /// Cosine between the interpolated (not mapped) normal and the geometric one.
-    pub(crate) between: f32,
+    pub(crate) between: F,
     /// Unit direction to the viewer.
-    pub(crate) view: Vec3,
+    pub(crate) view: V3<F>,
     /// How far the smooth surface that the normals suggest bulges over the facet here.
-    bulge: Vec3,
+    bulge: V3<F>,
     /// Length of the filtered normal map vector: below 1 where normals vary within the footprint.
-    pub(crate) map_length: f32,
+    pub(crate) map_length: F,
 }
 
-impl Surface {
-    /// The surface of `patch`, where `ray` met it.
-    pub(crate) fn new(ctx: &FrameContext<'_>, info: &InstanceInfo, patch: &Patch<'_>, ray: &Ray, hit: &Hit) -> Self {
-        let view = unit_or(-ray.dir, Vec3::Z);
+impl<F: Floats> Surface<F> {
+    /// The surfaces at `spots`, whose triangles are `patch`, where rays along `dir` met them.
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    pub(crate) fn new<'a>(
+        ctx: &FrameContext<'a>,
+        spots: &Spots<'a>,
+        patch: &Patch<F>,
+        maps: &mut Maps<'a, '_, F>,
+        dir: V3<F>,
+    ) -> Self {
+        let (zero, one) = (F::splat(0.0), F::splat(1.0));
+        let view = (-dir).unit_or(V3::splat(Vec3::Z));
         let [w, u, v] = patch.weights;
         let [a, b, c] = patch.corners;
-        let point = a * w + b * u + c * v;
-        let error = ((a * w).abs() + (b * u).abs() + (c * v).abs()) * POINT_ERROR;
-        let error = error.max(Vec3::splat(error.max_element() * LEAST_ERROR));
-        let side = if info.mirrored { -1.0 } else { 1.0 };
+        let point = patch.blend3(patch.corners);
+        let error = ((a * w).abs() + (b * u).abs() + (c * v).abs()) * F::splat(POINT_ERROR);
+        let error = error.max(V3::all(error.max_element() * F::splat(LEAST_ERROR)));
+        let side = F::select(spots.lanes(|spot| spot.info.mirrored), -one, one);
         // Outward by the file's winding, before it is turned to the viewer.
-        let outward = unit_or(patch.cross * side, view);
-        let front = outward.dot(view) >= 0.0;
-        let facing = if front { 1.0 } else { -1.0 };
+        let outward = (patch.cross * side).unit_or(view);
+        let facing = F::select(zero.le(outward.dot(view)), one, -one);
         let n_geom = outward * facing;
 
-        let normals = patch.vertices.map(|i| ctx.normal(hit, info, i));
-        let (smooth, bulge) = match normals {
-            [Some(na), Some(nb), Some(nc)] => {
-                let smooth = unit_or(na * w + nb * u + nc * v, outward);
-                (smooth, bulge(point, [a, b, c], [na, nb, nc].map(|n| n * facing), patch.weights))
-            }
-            _ => (outward, Vec3::ZERO),
-        };
-        let (mapped, map_length) = match ctx.material(info).normal_map {
-            Some(binding) => mapped_normal(ctx, info, patch, hit, &binding, smooth),
-            None => (smooth, 1.0),
+        let (smoothed, normals) = spots.at_corners(spots.mask, |spot, i| ctx.normal(spot.instance, spot.info, i));
+        let smooth = V3::select(smoothed, patch.blend3(normals).unit_or(outward), outward);
+        let [na, nb, nc] = normals;
+        let bulge = bulge(point, patch, [na * facing, nb * facing, nc * facing]);
+        let bulge = V3::select(smoothed, bulge, V3::zero());
+        let (mapped, map_length) = match maps.place(Channel::Normal) {
+            Some(placed) => mapped_normal(ctx, spots, patch, maps, &placed, smooth),
+            None => (smooth, one),
         };
         // Normals that contradict the winding are taken as an artist's inverted normals.
-        let turn = |n: Vec3| if smooth.dot(outward) < 0.0 { n * -facing } else { n * facing };
-        let n_shade = towards_viewer(turn(mapped), view);
-        let between = turn(smooth).dot(n_geom);
+        let turn = F::select(smooth.dot(outward).lt(zero), -facing, facing);
+        let n_shade = towards_viewer(mapped * turn, view);
+        let between = (smooth * turn).dot(n_geom);
         Self { point, error, n_geom, n_shade, between, view, bulge, map_length }
     }
 
-    /// Where a ray that leaves along `dir` starts: past the error of the point, on the side that it leaves to.
+    /// Where rays that leave along `dir` start: past the error of the point, on the side that they leave to.
     ///
     /// # Source
     /// Pharr, Jakob and Humphreys, "Physically Based Rendering", 4th edition, section 6.8.6.
-    #[inline(always)]
-    pub(crate) fn origin(&self, dir: Vec3) -> Vec3 {
-        let away = if dir.dot(self.n_geom) < 0.0 { -self.n_geom } else { self.n_geom };
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    pub(crate) fn origin(&self, dir: V3<F>) -> V3<F> {
+        let away = V3::select(dir.dot(self.n_geom).lt(F::splat(0.0)), -self.n_geom, self.n_geom);
         let offset = away * away.abs().dot(self.error);
         let start = self.point + offset;
-        Vec3::new(past(start.x, away.x), past(start.y, away.y), past(start.z, away.z))
+        V3 { x: past(start.x, away.x), y: past(start.y, away.y), z: past(start.z, away.z) }
     }
 
     /// [`Surface::origin`] for shadow rays: lifted to the smooth surface, so that facets do not shadow themselves.
     #[inline(always)]
-    pub(crate) fn shadow_origin(&self, dir: Vec3) -> Vec3 {
+    pub(crate) fn shadow_origin(&self, dir: V3<F>) -> V3<F> {
         self.origin(dir) + self.bulge
     }
 }
 
 /// The next float in the direction of `away`: a point with error zero, as on a coordinate plane, must leave it too.
 #[inline(always)]
-fn past(x: f32, away: f32) -> f32 {
+fn past<F: Floats>(x: F, away: F) -> F {
+    let (mut x, away) = (row(x), row(away));
+    for i in 0..F::LEN {
+        x[i] = past_one(x[i], away[i]);
+    }
+    F::load(&x)
+}
+
+#[inline(always)]
+fn past_one(x: f32, away: f32) -> f32 {
     if away > 0.0 {
         x.next_up()
     } else if away < 0.0 {
@@ -199,62 +120,88 @@ fn past(x: f32, away: f32) -> f32 {
 ///
 /// # Source
 /// Hanika, "Hacking the Shadow Terminator", Ray Tracing Gems II, 2021.
-#[inline(always)]
-fn bulge(point: Vec3, corners: [Vec3; 3], normals: [Vec3; 3], weights: [f32; 3]) -> Vec3 {
-    let mut sum = Vec3::ZERO;
-    for i in 0..3 {
-        let below = (point - corners[i]).dot(normals[i]).min(0.0);
-        sum -= normals[i] * (below * weights[i]);
+#[cfg_attr(not(debug_assertions), inline(always))]
+fn bulge<F: Floats>(point: V3<F>, patch: &Patch<F>, normals: [V3<F>; 3]) -> V3<F> {
+    let mut sum = V3::zero();
+    for ((corner, weight), normal) in patch.corners.into_iter().zip(patch.weights).zip(normals) {
+        let below = (point - corner).dot(normal).min(F::splat(0.0));
+        sum = sum - normal * (below * weight);
     }
     sum
 }
 
-/// Keeps a shading normal on the viewer's side: tilted just enough where interpolation or a map turned it away.
-#[inline(always)]
-fn towards_viewer(n: Vec3, view: Vec3) -> Vec3 {
-    const LEAST: f32 = 0.02;
+/// Keeps shading normals on the viewer's side: tilted just enough where interpolation or a map turned them away.
+#[cfg_attr(not(debug_assertions), inline(always))]
+fn towards_viewer<F: Floats>(n: V3<F>, view: V3<F>) -> V3<F> {
+    let least = F::splat(0.02);
     let cos = n.dot(view);
-    if cos >= LEAST { n } else { unit_or(n + view * (LEAST - cos), view) }
+    let upright = least.le(cos);
+    if upright == F::ALL {
+        return n;
+    }
+    V3::select(upright, n, (n + view * (least - cos)).unit_or(view))
 }
 
-/// The normal map's normal around `smooth`, on the side of the file's winding, and the length of the filtered vector.
-fn mapped_normal(
-    ctx: &FrameContext<'_>,
-    info: &InstanceInfo,
-    patch: &Patch<'_>,
-    hit: &Hit,
-    binding: &Binding,
-    smooth: Vec3,
-) -> (Vec3, f32) {
-    let (uv, footprint) = patch.coordinates(binding.set);
-    let texel = binding.read(&ctx.scene(info).pyramids, uv, &footprint);
-    let raw = Vec3::new(texel.x, texel.y, texel.z) * 2.0 - Vec3::ONE;
-    let scale = ctx.material(info).normal_scale;
-    let Some((tangent, bitangent)) = tangent_frame(ctx, info, patch, hit, binding, smooth) else {
-        return (smooth, 1.0);
-    };
+/// The normal maps' normals around `smooth`, on the side of the file's winding, and the lengths of the filtered
+/// vectors; `smooth` and 1 in lanes without a map.
+#[cfg_attr(not(debug_assertions), inline(always))]
+fn mapped_normal<'a, F: Floats>(
+    ctx: &FrameContext<'a>,
+    spots: &Spots<'a>,
+    patch: &Patch<F>,
+    maps: &Maps<'a, '_, F>,
+    placed: &Placed<'a, F>,
+    smooth: V3<F>,
+) -> (V3<F>, F) {
+    let one = F::splat(1.0);
+    let [x, y, z, _] = maps.read(placed);
+    let raw = V3 { x, y, z } * F::splat(2.0) - V3::all(one);
+    let scale = spots.number(|spot| spot.material.normal_scale);
+    let (framed, tangent, bitangent) = tangent_frame(ctx, spots, patch, placed, smooth);
     let n = tangent * (raw.x * scale) + bitangent * (raw.y * scale) + smooth * raw.z;
-    (unit_or(n, smooth), raw.length().min(1.0))
+    let normal = V3::select(framed, n.unit_or(smooth), smooth);
+    (normal, F::select(framed, raw.length().min(one), one))
 }
 
-/// Unit tangent and bitangent perpendicular to `smooth`: the file's, else from the texture coordinates.
-fn tangent_frame(
-    ctx: &FrameContext<'_>,
-    info: &InstanceInfo,
-    patch: &Patch<'_>,
-    hit: &Hit,
-    binding: &Binding,
-    smooth: Vec3,
-) -> Option<(Vec3, Vec3)> {
-    let stored =
-        if patch.part.tangents.is_empty() { [None; 3] } else { patch.vertices.map(|i| ctx.tangent(hit, info, i)) };
-    let (along, sign) = if let [Some((ta, sign)), Some((tb, _)), Some((tc, _))] = stored {
-        let [w, u, v] = patch.weights;
-        (ta * w + tb * u + tc * v, sign)
-    } else {
-        let (tangent, bitangent) = patch.tangents(binding)?;
-        (tangent, if smooth.cross(tangent).dot(bitangent) < 0.0 { -1.0 } else { 1.0 })
-    };
-    let across = unit_or(along - smooth * smooth.dot(along), Vec3::ZERO);
-    (across != Vec3::ZERO).then(|| (across, smooth.cross(across) * sign))
+/// Unit tangents and bitangents perpendicular to `smooth`: the file's, else from the texture coordinates; and the lanes
+/// that have them.
+#[cfg_attr(not(debug_assertions), inline(always))]
+fn tangent_frame<'a, F: Floats>(
+    ctx: &FrameContext<'a>,
+    spots: &Spots<'a>,
+    patch: &Patch<F>,
+    placed: &Placed<'a, F>,
+    smooth: V3<F>,
+) -> (u32, V3<F>, V3<F>) {
+    let (zero, one) = (F::splat(0.0), F::splat(1.0));
+    let asked = placed.mask & spots.lanes(|spot| !spot.part.tangents.is_empty());
+    let mut along = V3::zero();
+    let mut sign = one;
+    let mut stored = 0;
+    if asked != 0 {
+        let (found, corners) =
+            spots.at_corners(asked, |spot, i| ctx.tangent(spot.instance, spot.info, i).map(|(t, _)| t));
+        let negative = spots.lanes_at_corner(found, |spot, i| {
+            ctx.tangent(spot.instance, spot.info, i).is_some_and(|(_, sign)| sign < 0.0)
+        });
+        (stored, along, sign) = (found, patch.blend3(corners), F::select(negative, -one, one));
+    }
+    let mut known = stored;
+    if placed.mask & !stored != 0 {
+        let [du, dv] = placed.edges();
+        let [a, b, c] = patch.corners;
+        let (e1, e2) = (b - a, c - a);
+        let det = du.x * dv.y - dv.x * du.y;
+        let turned = F::select(det.lt(zero), -one, one);
+        let tangent = (e1 * dv.y - e2 * du.y) * turned;
+        let bitangent = (e1 * dv.x - e2 * du.x) * turned;
+        let spans = zero.lt(det.abs()) & det.abs().lt(F::splat(f32::INFINITY));
+        let left = F::select(smooth.cross(tangent).dot(bitangent).lt(zero), -one, one);
+        along = V3::select(stored, along, tangent);
+        sign = F::select(stored, sign, left);
+        known |= placed.mask & spans;
+    }
+    let across = (along - smooth * smooth.dot(along)).unit_or(V3::zero());
+    let framed = known & zero.lt(across.abs().max_element());
+    (framed, across, smooth.cross(across) * sign)
 }

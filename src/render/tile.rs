@@ -5,10 +5,11 @@ use std::ops::Range;
 use glam::Vec3;
 
 use super::{
-    block::{Block, SIDE, lane},
+    block::{Block, COLUMNS, block_rows},
     context::FrameContext,
     sky::backdrop,
-    tone::filmic,
+    tone::filmic_of,
+    wide::{Bits, Floats, LANES, V3, put3, row},
 };
 use crate::simd::{Simd, Task};
 
@@ -36,38 +37,48 @@ impl Task for BandTask<'_, '_> {
 
     #[inline(always)]
     fn run<S: Simd>(mut self) -> u64 {
-        let width = self.ctx.size[0];
+        let ctx = self.ctx;
+        let width = ctx.size[0];
         #[expect(clippy::cast_possible_truncation, reason = "at most BAND_ROWS")]
         let bottom = self.band.top + (self.band.color.len() / width as usize) as u32;
+        let [x0, y0, x1, y1] = ctx.rect;
+        let mut behind = [Vec3::ZERO; BAND_ROWS];
         for y in self.band.top..bottom {
-            self.clear_row(y);
+            let color = background(ctx, y);
+            behind[(y - self.band.top) as usize] = color;
+            // Blocks write what lies in the rectangle.
+            let (left, right) = if (y0..y1).contains(&y) { (x0, x1.max(x0)) } else { (width, width) };
+            self.clear(y, 0..left, color);
+            self.clear(y, right..width, color);
         }
-        let [x0, y0, x1, y1] = self.ctx.rect;
-        let (top, bottom) = (self.band.top.max(y0), bottom.min(y1));
         let mut rays = 0;
         let mut y = self.band.top;
         while y < bottom {
-            let rows = y.max(top)..(y + SIDE).min(bottom);
-            let mut x = x0 - x0 % SIDE;
+            let rows = y.max(y0)..(y + block_rows::<S>()).min(bottom).min(y1);
+            let mut x = x0 - x0 % COLUMNS;
             while x < x1 && !rows.is_empty() {
-                rays += self.block::<S>(x, y, x.max(x0)..(x + SIDE).min(x1), rows.clone());
-                x += SIDE;
+                let mut block = Block::<S::F>::new(x, y, &(x.max(x0)..(x + COLUMNS).min(x1)), &rows);
+                for sample in 0..ctx.settings.samples {
+                    block.add_sample::<S>(ctx, ctx.settings.first_sample.wrapping_add(sample));
+                }
+                self.store(&block, &behind);
+                rays += block.rays;
+                x += COLUMNS;
             }
-            y += SIDE;
+            y += block_rows::<S>();
         }
         rays
     }
 }
 
 impl BandTask<'_, '_> {
-    /// Fills a row with the background.
-    fn clear_row(&mut self, y: u32) {
-        let behind = background(self.ctx, y);
-        let first = self.at(0, y);
-        let row = first..first + self.ctx.size[0] as usize;
-        self.band.color[row.clone()].fill([behind.x, behind.y, behind.z, 0.0]);
-        self.band.depth[row.clone()].fill(f32::INFINITY);
-        self.band.instance[row].fill(0);
+    /// Fills a part of a row with the background.
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    fn clear(&mut self, y: u32, columns: Range<u32>, behind: Vec3) {
+        let part = self.at(columns.start, y)..self.at(columns.end, y);
+        self.band.color[part.clone()].fill([behind.x, behind.y, behind.z, 0.0]);
+        self.band.depth[part.clone()].fill(f32::INFINITY);
+        self.band.instance[part].fill(0);
     }
 
     /// Place of a pixel in the band.
@@ -76,35 +87,24 @@ impl BandTask<'_, '_> {
         (y - self.band.top) as usize * self.ctx.size[0] as usize + x as usize
     }
 
-    /// Renders the pixels `columns` x `rows` of the block that begins at (`left`, `top`).
-    #[inline(always)]
-    fn block<S: Simd>(&mut self, left: u32, top: u32, columns: Range<u32>, rows: Range<u32>) -> u64 {
-        let ctx = self.ctx;
-        let mut block = Block::new(left, top, &columns, &rows);
-        let settings = &ctx.settings;
-        for sample in (0..settings.samples).map(|s| settings.first_sample.wrapping_add(s)) {
-            block.add_sample::<S>(ctx, sample);
+    /// Writes a block's pixels, over the colours of `behind` of the band's rows.
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    fn store<F: Floats>(&mut self, block: &Block<F>, behind: &[Vec3; BAND_ROWS]) {
+        let mut back = [[0.0; LANES]; 3];
+        for lane in Bits(block.mask) {
+            let (_, y) = block.pixel(lane);
+            put3(&mut back, lane, behind[(y - self.band.top) as usize]);
         }
-        self.store(&block, columns, &rows);
-        block.rays
-    }
-
-    /// Writes a block's pixels over the background.
-    fn store(&mut self, block: &Block, columns: Range<u32>, rows: &Range<u32>) {
-        let scale = 1.0 / self.ctx.settings.samples as f32;
-        for y in rows.clone() {
-            let behind = background(self.ctx, y);
-            for x in columns.clone() {
-                let pixel = &block.pixels[lane(x - block.left, y - block.top)];
-                if pixel.instance != 0 {
-                    let at = self.at(x, y);
-                    let coverage = pixel.coverage * scale;
-                    let color = pixel.color * scale + behind * (1.0 - coverage);
-                    self.band.color[at] = [color.x, color.y, color.z, coverage];
-                    self.band.depth[at] = pixel.depth;
-                    self.band.instance[at] = pixel.instance;
-                }
-            }
+        let scale = F::splat(1.0 / self.ctx.settings.samples as f32);
+        let coverage = block.coverage * scale;
+        let color = block.color * scale + V3::load(&back) * (F::splat(1.0) - coverage);
+        let ([r, g, b], coverage) = (color.rows(), row(coverage));
+        for lane in Bits(block.mask) {
+            let (x, y) = block.pixel(lane);
+            let at = self.at(x, y);
+            self.band.color[at] = [r[lane], g[lane], b[lane], coverage[lane]];
+            self.band.depth[at] = block.depth[lane];
+            self.band.instance[at] = block.instance[lane];
         }
     }
 }
@@ -115,6 +115,6 @@ fn background(ctx: &FrameContext<'_>, y: u32) -> Vec3 {
     match ctx.settings.shading {
         shading if shading.is_lit() => color,
         super::Shading::Depth => Vec3::ZERO,
-        _ => filmic(color),
+        _ => filmic_of(color),
     }
 }

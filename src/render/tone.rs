@@ -4,6 +4,8 @@ use std::sync::OnceLock;
 
 use glam::{Mat3, Vec3};
 
+use super::wide::{Floats, One, V3};
+
 /// Scale before the curve: a diffuse white under the key light lands just below display white.
 const EXPOSURE: f32 = 1.6;
 
@@ -26,12 +28,25 @@ const RGB_FROM_CURVE: Mat3 = Mat3::from_cols(
 /// # Source
 /// Stephen Hill's fit of the ACES reference rendering and output transforms, 2016 (three rational terms between two
 /// matrices).
-#[inline(always)]
-pub(crate) fn filmic(color: Vec3) -> Vec3 {
+#[cfg_attr(not(debug_assertions), inline(always))]
+pub(crate) fn filmic<F: Floats>(color: V3<F>) -> V3<F> {
     // Light is bounded so that infinite and NaN inputs stay displayable.
-    let v = CURVE_FROM_RGB * (color.max(Vec3::splat(-16.0)).min(Vec3::splat(6e4)) * EXPOSURE);
-    let curve = (v * (v + 0.024_578_6) - 0.000_090_537) / (v * (v * 0.983_729 + 0.432_951) + 0.238_081);
-    (RGB_FROM_CURVE * curve).clamp(Vec3::ZERO, Vec3::ONE)
+    let bounded = color.max(V3::all(F::splat(-16.0))).min(V3::all(F::splat(6e4)));
+    let v = turned(&CURVE_FROM_RGB, bounded * F::splat(EXPOSURE));
+    let above = v.times(v + V3::all(F::splat(0.024_578_6))) - V3::all(F::splat(0.000_090_537));
+    let below = v.times(v * F::splat(0.983_729) + V3::all(F::splat(0.432_951))) + V3::all(F::splat(0.238_081));
+    let curve = V3 { x: above.x / below.x, y: above.y / below.y, z: above.z / below.z };
+    turned(&RGB_FROM_CURVE, curve).max(V3::zero()).min(V3::all(F::splat(1.0)))
+}
+
+#[cfg_attr(not(debug_assertions), inline(always))]
+fn turned<F: Floats>(matrix: &Mat3, v: V3<F>) -> V3<F> {
+    V3::splat(matrix.x_axis) * v.x + V3::splat(matrix.y_axis) * v.y + V3::splat(matrix.z_axis) * v.z
+}
+
+/// [`filmic`] of one colour.
+pub(crate) fn filmic_of(color: Vec3) -> Vec3 {
+    filmic(V3::<One>::splat(color)).only()
 }
 
 /// The scene-referred colour that [`filmic`] shows as `display` (display-linear, up to 0.97): what an unlit
@@ -178,20 +193,20 @@ mod tests {
     fn the_curve_rises_and_stays_in_range() {
         let mut last = -1.0;
         for i in 0..2000 {
-            let y = filmic(Vec3::splat(i as f32 * 0.01)).y;
+            let y = filmic_of(Vec3::splat(i as f32 * 0.01)).y;
             assert!((0.0..=1.0).contains(&y) && y >= last);
             last = y;
         }
-        assert!(filmic(Vec3::ZERO).max_element() < 1e-3);
-        assert!(filmic(Vec3::INFINITY).min_element() > 0.99);
-        assert!(!filmic(Vec3::NAN).is_nan());
+        assert!(filmic_of(Vec3::ZERO).max_element() < 1e-3);
+        assert!(filmic_of(Vec3::INFINITY).min_element() > 0.99);
+        assert!(!filmic_of(Vec3::NAN).is_nan());
     }
 
     #[test]
     fn the_inverse_shows_colours_as_authored() {
         for i in 0..1000u32 {
             let c = Vec3::new((i % 10) as f32 / 10.0, (i / 10 % 10) as f32 / 10.0, (i / 100) as f32 / 10.0);
-            let back = filmic(filmic_inverse(c));
+            let back = filmic_of(filmic_inverse(c));
             assert!((back - c).abs().max_element() < 2e-3, "{c} {back}");
         }
     }

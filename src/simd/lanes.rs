@@ -22,6 +22,9 @@ pub trait Simd: Copy + Send + Sync + 'static {
     /// Four f32 as f64, exactly.
     fn widen(narrow: Self::F4) -> Self::D4;
 
+    /// The first numbers of a slice as f64, exactly. Panics when it is too short.
+    fn load_wide(from: &[f32]) -> Self::D;
+
     /// Runs `task` in a function of its own, compiled for this level once for all callers: for work that is worth a
     /// call but not a copy at every call site.
     fn call<T: Task>(task: T) -> T::Output;
@@ -53,6 +56,14 @@ pub trait Lanes:
     /// Absolute values.
     #[must_use]
     fn abs(self) -> Self;
+    /// Square roots, correctly rounded; NaN below zero.
+    #[must_use]
+    fn sqrt(self) -> Self;
+    /// The largest whole numbers not above; NaN and infinities stay.
+    #[must_use]
+    fn floor(self) -> Self;
+    /// Lanes of `a` whose bit is set in `mask`, of `b` elsewhere.
+    fn select(mask: u32, a: Self, b: Self) -> Self;
     /// `self * b + c`, rounded once or twice depending on the level: only for values that are used with a bound that
     /// covers both.
     #[must_use]

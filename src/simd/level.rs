@@ -1,9 +1,10 @@
 use std::{fmt, str::FromStr, sync::LazyLock};
 
 /// An instruction set that kernels are compiled for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum SimdLevel {
     /// Portable code.
+    #[default]
     Scalar,
     /// AVX2 with FMA, BMI1, BMI2 and LZCNT.
     Avx2,

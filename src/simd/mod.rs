@@ -17,7 +17,7 @@ pub use barrier::branch_barrier;
 pub use dispatch::{Task, dispatch};
 pub use lanes::{Halves, Lanes, Simd};
 pub use level::SimdLevel;
-pub use scalar::Scalar;
+pub use scalar::{Array, Scalar};
 
 #[cfg(test)]
 mod tests;

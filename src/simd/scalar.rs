@@ -21,6 +21,12 @@ impl Simd for Scalar {
         Array(narrow.0.map(f64::from))
     }
 
+    #[inline(always)]
+    fn load_wide(from: &[f32]) -> Self::D {
+        let from = &from[..4];
+        Array(array::from_fn(|i| f64::from(from[i])))
+    }
+
     #[inline(never)]
     fn call<T: Task>(task: T) -> T::Output {
         task.run::<Self>()
@@ -113,6 +119,18 @@ macro_rules! array_lanes {
             #[inline(always)]
             fn abs(self) -> Self {
                 Self(self.0.map(<$elem>::abs))
+            }
+            #[inline(always)]
+            fn sqrt(self) -> Self {
+                Self(self.0.map(<$elem>::sqrt))
+            }
+            #[inline(always)]
+            fn floor(self) -> Self {
+                Self(self.0.map(<$elem>::floor))
+            }
+            #[inline(always)]
+            fn select(mask: u32, a: Self, b: Self) -> Self {
+                Self(array::from_fn(|i| if mask >> i & 1 == 1 { a.0[i] } else { b.0[i] }))
             }
             #[inline(always)]
             fn mul_add_loose(self, b: Self, c: Self) -> Self {

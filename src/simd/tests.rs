@@ -22,8 +22,19 @@ fn bits64(values: &[f64]) -> impl Iterator<Item = u64> + '_ {
 /// All operations on vectors of one type, over rows of 16 numbers; `zero` is any number.
 #[inline(always)]
 fn each<V: Lanes>(a: &[V::Elem], b: &[V::Elem], zero: V::Elem) -> (Vec<V::Elem>, u32, u32) {
-    let operations: [fn(V, V) -> V; 8] =
-        [|a, b| a + b, |a, b| a - b, |a, b| a * b, |a, b| a / b, V::min, V::max, |a, _| -a, |a, _| a.abs()];
+    let operations: [fn(V, V) -> V; 11] = [
+        |a, b| a + b,
+        |a, b| a - b,
+        |a, b| a * b,
+        |a, b| a / b,
+        V::min,
+        V::max,
+        |a, _| -a,
+        |a, _| a.abs(),
+        |a, _| a.sqrt(),
+        |a, _| a.floor(),
+        |a, b| V::select(a.lt(b), b - a, a),
+    ];
     let mut rows = Vec::new();
     let (mut below, mut at_most) = (0, 0);
     for operation in operations {
@@ -70,6 +81,11 @@ impl Task for Operations<'_> {
         out.extend(bits32(&[four.first(), four.second()]));
         let mut wide = [0.0; 4];
         S::widen(four).store(&mut wide);
+        out.extend(bits64(&wide));
+        let mut wide = [0.0; 16];
+        for first in (0..16).step_by(S::D::LEN) {
+            S::load_wide(&self.a[first..]).store(&mut wide[first..]);
+        }
         out.extend(bits64(&wide));
         out
     }

@@ -11,6 +11,14 @@ use super::{
     dispatch::{call_avx2, call_avx512},
 };
 
+/// Calls one intrinsic.
+macro_rules! call {
+    ($intrinsic:ident $(::<$constant:ident>)? ($($arg:expr),*)) => {
+        // SAFETY: the intrinsic's feature is in the level (module head).
+        unsafe { $intrinsic $(::<$constant>)? ($($arg),*) }
+    };
+}
+
 /// AVX2 with FMA.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Avx2;
@@ -29,6 +37,11 @@ impl Simd for Avx2 {
     #[inline(always)]
     fn widen(narrow: F32x4) -> F64x4 {
         widen(narrow)
+    }
+
+    #[inline(always)]
+    fn load_wide(from: &[f32]) -> F64x4 {
+        widen(F32x4::load(from))
     }
 
     #[inline(always)]
@@ -51,6 +64,11 @@ impl Simd for Avx512 {
     }
 
     #[inline(always)]
+    fn load_wide(from: &[f32]) -> F64x8 {
+        F64x8(call!(_mm512_cvtps_pd(F32x8::load(from).0)))
+    }
+
+    #[inline(always)]
     fn call<T: Task>(task: T) -> T::Output {
         // SAFETY: the type is private to this module, so code names it only below a dispatch that found its features.
         unsafe { call_avx512(task) }
@@ -63,14 +81,6 @@ fn widen(narrow: F32x4) -> F64x4 {
     F64x4(unsafe { _mm256_cvtps_pd(narrow.0) })
 }
 
-/// Calls one intrinsic.
-macro_rules! call {
-    ($intrinsic:ident $(::<$constant:ident>)? ($($arg:expr),*)) => {
-        // SAFETY: the intrinsic's feature is in the level (module head).
-        unsafe { $intrinsic $(::<$constant>)? ($($arg),*) }
-    };
-}
-
 /// Comparison into a bit mask, by vector compare and move or by mask register.
 macro_rules! compare {
     (vector $cmp:ident $movemask:ident, $predicate:ident, $a:expr, $b:expr) => {
@@ -81,10 +91,70 @@ macro_rules! compare {
     };
 }
 
+#[inline(always)]
+fn floor_f32x4(x: __m128) -> __m128 {
+    call!(_mm_floor_ps(x))
+}
+
+#[inline(always)]
+fn floor_f32x8(x: __m256) -> __m256 {
+    call!(_mm256_floor_ps(x))
+}
+
+#[inline(always)]
+fn floor_f64x4(x: __m256d) -> __m256d {
+    call!(_mm256_floor_pd(x))
+}
+
+#[inline(always)]
+fn floor_f32x16(x: __m512) -> __m512 {
+    const DOWN: i32 = _MM_FROUND_TO_NEG_INF | _MM_FROUND_NO_EXC;
+    call!(_mm512_roundscale_ps::<DOWN>(x))
+}
+
+#[inline(always)]
+fn floor_f64x8(x: __m512d) -> __m512d {
+    const DOWN: i32 = _MM_FROUND_TO_NEG_INF | _MM_FROUND_NO_EXC;
+    call!(_mm512_roundscale_pd::<DOWN>(x))
+}
+
+#[inline(always)]
+fn choose_f32x4(mask: u32, a: __m128, b: __m128) -> __m128 {
+    let lanes = call!(_mm_setr_epi32(1, 2, 4, 8));
+    let chosen = call!(_mm_cmpeq_epi32(call!(_mm_and_si128(call!(_mm_set1_epi32(mask.cast_signed())), lanes)), lanes));
+    call!(_mm_blendv_ps(b, a, call!(_mm_castsi128_ps(chosen))))
+}
+
+#[inline(always)]
+fn choose_f32x8(mask: u32, a: __m256, b: __m256) -> __m256 {
+    let lanes = call!(_mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128));
+    let bits = call!(_mm256_and_si256(call!(_mm256_set1_epi32(mask.cast_signed())), lanes));
+    call!(_mm256_blendv_ps(b, a, call!(_mm256_castsi256_ps(call!(_mm256_cmpeq_epi32(bits, lanes))))))
+}
+
+#[inline(always)]
+fn choose_f64x4(mask: u32, a: __m256d, b: __m256d) -> __m256d {
+    let lanes = call!(_mm256_setr_epi64x(1, 2, 4, 8));
+    let bits = call!(_mm256_and_si256(call!(_mm256_set1_epi64x(i64::from(mask))), lanes));
+    call!(_mm256_blendv_pd(b, a, call!(_mm256_castsi256_pd(call!(_mm256_cmpeq_epi64(bits, lanes))))))
+}
+
+#[inline(always)]
+#[expect(clippy::cast_possible_truncation, reason = "a bit a lane")]
+fn choose_f32x16(mask: u32, a: __m512, b: __m512) -> __m512 {
+    call!(_mm512_mask_blend_ps(mask as u16, b, a))
+}
+
+#[inline(always)]
+#[expect(clippy::cast_possible_truncation, reason = "a bit a lane")]
+fn choose_f64x8(mask: u32, a: __m512d, b: __m512d) -> __m512d {
+    call!(_mm512_mask_blend_pd(mask as u8, b, a))
+}
+
 macro_rules! vector {
     ($name:ident($raw:ident), $elem:ident x $len:literal, compare $($compare:ident)+,
      $set1:ident $load:ident $store:ident $add:ident $sub:ident $mul:ident $div:ident $min:ident $max:ident
-     $fmadd:ident $fmsub:ident $xor:ident $andnot:ident) => {
+     $fmadd:ident $fmsub:ident $xor:ident $andnot:ident $sqrt:ident $floor:ident $choose:ident) => {
         #[derive(Clone, Copy, Debug)]
         pub(super) struct $name($raw);
 
@@ -161,6 +231,18 @@ macro_rules! vector {
                 Self(call!($andnot(call!($set1(-0.0)), self.0)))
             }
             #[inline(always)]
+            fn sqrt(self) -> Self {
+                Self(call!($sqrt(self.0)))
+            }
+            #[inline(always)]
+            fn floor(self) -> Self {
+                Self($floor(self.0))
+            }
+            #[inline(always)]
+            fn select(mask: u32, a: Self, b: Self) -> Self {
+                Self($choose(mask, a.0, b.0))
+            }
+            #[inline(always)]
             fn mul_add_loose(self, b: Self, c: Self) -> Self {
                 Self(call!($fmadd(self.0, b.0, c.0)))
             }
@@ -182,19 +264,24 @@ macro_rules! vector {
 
 vector!(F32x4(__m128), f32 x 4, compare vector _mm_cmp_ps _mm_movemask_ps,
     _mm_set1_ps _mm_loadu_ps _mm_storeu_ps _mm_add_ps _mm_sub_ps _mm_mul_ps _mm_div_ps _mm_min_ps _mm_max_ps
-    _mm_fmadd_ps _mm_fmsub_ps _mm_xor_ps _mm_andnot_ps);
+    _mm_fmadd_ps _mm_fmsub_ps _mm_xor_ps _mm_andnot_ps
+    _mm_sqrt_ps floor_f32x4 choose_f32x4);
 vector!(F32x8(__m256), f32 x 8, compare vector _mm256_cmp_ps _mm256_movemask_ps,
     _mm256_set1_ps _mm256_loadu_ps _mm256_storeu_ps _mm256_add_ps _mm256_sub_ps _mm256_mul_ps _mm256_div_ps _mm256_min_ps
-    _mm256_max_ps _mm256_fmadd_ps _mm256_fmsub_ps _mm256_xor_ps _mm256_andnot_ps);
+    _mm256_max_ps _mm256_fmadd_ps _mm256_fmsub_ps _mm256_xor_ps _mm256_andnot_ps
+    _mm256_sqrt_ps floor_f32x8 choose_f32x8);
 vector!(F64x4(__m256d), f64 x 4, compare vector _mm256_cmp_pd _mm256_movemask_pd,
     _mm256_set1_pd _mm256_loadu_pd _mm256_storeu_pd _mm256_add_pd _mm256_sub_pd _mm256_mul_pd _mm256_div_pd _mm256_min_pd
-    _mm256_max_pd _mm256_fmadd_pd _mm256_fmsub_pd _mm256_xor_pd _mm256_andnot_pd);
+    _mm256_max_pd _mm256_fmadd_pd _mm256_fmsub_pd _mm256_xor_pd _mm256_andnot_pd
+    _mm256_sqrt_pd floor_f64x4 choose_f64x4);
 vector!(F32x16(__m512), f32 x 16, compare register _mm512_cmp_ps_mask,
     _mm512_set1_ps _mm512_loadu_ps _mm512_storeu_ps _mm512_add_ps _mm512_sub_ps _mm512_mul_ps _mm512_div_ps _mm512_min_ps
-    _mm512_max_ps _mm512_fmadd_ps _mm512_fmsub_ps _mm512_xor_ps _mm512_andnot_ps);
+    _mm512_max_ps _mm512_fmadd_ps _mm512_fmsub_ps _mm512_xor_ps _mm512_andnot_ps
+    _mm512_sqrt_ps floor_f32x16 choose_f32x16);
 vector!(F64x8(__m512d), f64 x 8, compare register _mm512_cmp_pd_mask,
     _mm512_set1_pd _mm512_loadu_pd _mm512_storeu_pd _mm512_add_pd _mm512_sub_pd _mm512_mul_pd _mm512_div_pd _mm512_min_pd
-    _mm512_max_pd _mm512_fmadd_pd _mm512_fmsub_pd _mm512_xor_pd _mm512_andnot_pd);
+    _mm512_max_pd _mm512_fmadd_pd _mm512_fmsub_pd _mm512_xor_pd _mm512_andnot_pd
+    _mm512_sqrt_pd floor_f64x8 choose_f64x8);
 
 /// Lane numbers for `vpermilps`.
 #[derive(Clone, Copy, Debug)]

@@ -6,7 +6,7 @@ use super::{
     top::FLAT,
 };
 use crate::{
-    accel::{Closest, PACKET, TravRay},
+    accel::{Closest, PACKET, PacketBoxes, TravRay},
     geom::{Hit, Ray},
     simd::Simd,
 };
@@ -24,17 +24,20 @@ impl Packet {
     /// `None` when no ray can hit anything.
     #[inline(always)]
     fn new(rays: &[Ray]) -> Option<Self> {
-        let mut first = None;
-        let mut made = [None; PACKET];
-        for (made, ray) in made.iter_mut().zip(rays) {
-            *made = TravRay::new(ray);
-            first = first.or(*made);
-        }
-        let mut packet = Self { rays: [first?; PACKET], active: 0, len: rays.len() };
-        for (i, made) in made.iter().enumerate() {
-            if let Some(ray) = made {
-                packet.rays[i] = *ray;
+        let mut packet = Self { rays: [TravRay::STAND_IN; PACKET], active: 0, len: rays.len() };
+        for (i, ray) in rays.iter().enumerate().take(PACKET) {
+            if let Some(ray) = TravRay::new(ray) {
+                packet.rays[i] = ray;
                 packet.active |= 1 << i;
+            }
+        }
+        if packet.active == 0 {
+            return None;
+        }
+        let leader = *packet.leader();
+        for (i, ray) in packet.rays.iter_mut().enumerate() {
+            if (packet.active >> i) & 1 == 0 {
+                *ray = leader;
             }
         }
         Some(packet)
@@ -64,14 +67,17 @@ impl World {
         assert!(rays.len() <= PACKET && rays.len() <= hits.len(), "at most {PACKET} rays, a hit for each");
         hits.fill(None);
         let Some(packet) = Packet::new(rays) else { return };
-        let mut best = [Closest::new(packet.leader()); PACKET];
-        for (best, ray) in best.iter_mut().zip(packet.rays()) {
-            *best = Closest::new(ray);
-        }
+        let mut best: [Closest; PACKET] = std::array::from_fn(|i| Closest::new(&packet.rays[i]));
         if self.groups.len() <= FLAT {
             let order = self.top.order(&self.groups, packet.leader());
+            let boxes = PacketBoxes::new::<S>(&packet.rays);
             for &number in &order[..self.groups.len()] {
-                self.groups[number].closest_packet::<S>(packet.rays(), packet.active, &mut best[..packet.len]);
+                let limits = std::array::from_fn(|i| best[i].t_cull());
+                let group = &self.groups[number];
+                let open = packet.active & boxes.meeting::<S>(&group.bounds, &limits);
+                if open != 0 {
+                    group.closest_packet::<S>(packet.rays(), open, &mut best[..packet.len]);
+                }
             }
         } else {
             for i in 0..packet.len {
@@ -98,12 +104,13 @@ impl World {
         let Some(packet) = Packet::new(rays) else { return 0 };
         let mut blocked = 0;
         if self.groups.len() <= FLAT {
+            let boxes = PacketBoxes::new::<S>(&packet.rays);
+            let limits = std::array::from_fn(|i| packet.rays[i].range().t_far);
             for group in &self.groups {
-                let open = packet.active & !blocked;
-                if open == 0 {
-                    break;
+                let open = packet.active & !blocked & boxes.meeting::<S>(&group.bounds, &limits);
+                if open != 0 {
+                    blocked |= group.occluded_packet::<S>(packet.rays(), open);
                 }
-                blocked |= group.occluded_packet::<S>(packet.rays(), open);
             }
             return blocked;
         }

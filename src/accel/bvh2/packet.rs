@@ -3,13 +3,12 @@ use arrayvec::ArrayVec;
 use super::{
     Bvh2, MAX_DEPTH,
     node::{Link, Pair},
-    traverse::SLACK,
 };
 use crate::{
     accel::{
         Closest, Counter, HitSink, TravRay,
         packet::{PACKET, PacketRays, bits},
-        query::{GROW, SHRINK},
+        query::{GROW, ORDINARY_MAX, SHRINK, SLACK},
     },
     geom::Triangles,
     simd::{Lanes, Simd},
@@ -48,9 +47,10 @@ impl<S: Simd> PacketNode<S> {
         let (mut near, mut far) = (self.t_near, self.limit);
         for axis in 0..3 {
             let (entry, exit) = if self.backward[axis] { (child + 2, child) } else { (child, child + 2) };
-            let plane = |i: usize| S::F::splat(pair.planes[axis][i]) - self.origin[axis];
-            near = (plane(entry) * self.inv_near[axis]).max(near);
-            far = (plane(exit) * self.inv_far[axis]).min(far);
+            let entry = S::F::splat(pair.planes[axis][entry]) - self.origin[axis];
+            let exit = S::F::splat(pair.planes[axis][exit]) - self.origin[axis];
+            near = (entry * self.inv_near[axis]).max(near);
+            far = (exit * self.inv_far[axis]).min(far);
         }
         ((near - far).le(S::F::splat(SLACK)), near)
     }
@@ -75,17 +75,22 @@ fn load3<S: Simd>(rows: &[[f32; PACKET]; 3]) -> [S::F; 3] {
 /// True when the rays' directions agree in sign on every axis.
 #[inline(always)]
 fn agree(rays: &[TravRay]) -> bool {
-    let signs = |r: &TravRay| r.range().dir.to_array().map(|d| u32::from(d < 0.0));
-    let [x, y, z] = signs(&rays[0]);
-    let differing = rays.iter().map(signs).fold(0, |bits, [a, b, c]| bits | (a ^ x) | (b ^ y) | (c ^ z));
-    differing == 0
+    let (mut all, mut any) = (7, 0);
+    for ray in rays {
+        // There is no -0 here.
+        let dir = ray.range().dir;
+        let signs = (dir.x.to_bits() >> 31) | (dir.y.to_bits() >> 31) << 1 | (dir.z.to_bits() >> 31) << 2;
+        all &= signs;
+        any |= signs;
+    }
+    all == any
 }
 
 impl Bvh2 {
     /// True when the rays can be walked together.
     #[inline(always)]
-    fn takes_packet(&self, rays: &[TravRay]) -> bool {
-        rays.len() > 2 && rays.iter().fold(true, |all, r| all & self.is_ordinary(r)) && agree(rays)
+    fn takes_packet(&self, rays: &[TravRay], active: u32) -> bool {
+        active.count_ones() > 2 && self.reach <= ORDINARY_MAX && rays.iter().all(TravRay::is_ordinary) && agree(rays)
     }
 
     #[inline(always)]
@@ -102,7 +107,7 @@ impl Bvh2 {
             let end = rays.len().min(first + S::F::LEN);
             let (rays, best, sinks) = (&rays[first..end], &mut best[first..end], &sinks[first..end]);
             let active = (active >> first) & ((1 << rays.len()) - 1);
-            if self.takes_packet(rays) {
+            if self.takes_packet(rays, active) {
                 self.closest_together::<S, C, K>(rays, active, best, sinks, count);
             } else {
                 for i in bits(active) {
@@ -167,7 +172,7 @@ impl Bvh2 {
             let end = rays.len().min(first + S::F::LEN);
             let (rays, sinks) = (&rays[first..end], &sinks[first..end]);
             let active = (active >> first) & ((1 << rays.len()) - 1);
-            let part = if self.takes_packet(rays) {
+            let part = if self.takes_packet(rays, active) {
                 self.occluded_together::<S, C, K>(rays, active, sinks, count)
             } else {
                 bits(active).fold(0, |part, i| {

@@ -8,13 +8,10 @@ use crate::{
     accel::{
         Closest, Counter, HitSink, TravRay,
         block::BlockRay,
-        query::{GROW, ORDINARY_MAX, SHRINK},
+        query::{GROW, ORDINARY_MAX, SHRINK, SLACK},
     },
     simd::{Halves, Lanes, Simd, branch_barrier},
 };
-
-/// Absolute slack of the f32 node test: above every underflow it may meet.
-pub(super) const SLACK: f32 = f32::MIN_POSITIVE;
 
 /// Far children to visit: a link and a lower bound of the t at which the ray enters.
 ///
@@ -61,13 +58,12 @@ impl<S: Simd> FastNode<S> {
     #[inline(always)]
     fn new(ray: &TravRay, limit: f32) -> Self {
         let range = ray.range();
-        let (inv, dir) = (ray.inv().to_array(), range.dir.to_array());
+        let (origin, inv, dir) = (range.origin, ray.inv(), range.dir);
         let widen = S::F4::load(&[SHRINK, SHRINK, -GROW, -GROW]);
-        let swap = |axis: usize| S::F4::swap(dir[axis] < 0.0);
         Self {
-            origin: range.origin.to_array().map(S::F4::splat),
-            inv: inv.map(|inv| S::F4::splat(inv) * widen),
-            swap: [swap(0), swap(1), swap(2)],
+            origin: [S::F4::splat(origin.x), S::F4::splat(origin.y), S::F4::splat(origin.z)],
+            inv: [S::F4::splat(inv.x) * widen, S::F4::splat(inv.y) * widen, S::F4::splat(inv.z) * widen],
+            swap: [S::F4::swap(dir.x < 0.0), S::F4::swap(dir.y < 0.0), S::F4::swap(dir.z < 0.0)],
             limits: S::F4::load(&[range.t_near, range.t_near, -limit, -limit]),
             t_near: range.t_near,
             cull: limit + SLACK,

@@ -107,25 +107,90 @@ impl Pyramid {
         self.levels[level]
     }
 
+    /// A level ready to be read.
+    #[inline(always)]
+    pub(crate) fn view(&self, level: usize) -> LevelView<'_> {
+        let Level { width, height, first } = self.levels[level];
+        let texels = if level == 0 {
+            Texels::Fine(self.fine.as_chunks().0, self.table)
+        } else {
+            Texels::Coarse(&self.coarse[first..])
+        };
+        LevelView { width, height, texels }
+    }
+
     /// A texel in linear RGBA; row 0 is the top.
     #[inline(always)]
     pub(crate) fn texel(&self, level: usize, x: u32, y: u32) -> Vec4 {
-        let Level { width, first, .. } = self.levels[level];
-        let at = y as usize * width as usize + x as usize;
-        if level == 0 {
-            let [r, g, b, a] = self.fine[4 * at..4 * at + 4] else { return Vec4::ONE };
-            let decode = |code: u8| self.table[usize::from(code)];
-            Vec4::new(decode(r), decode(g), decode(b), f32::from(a) * (1.0 / 255.0))
-        } else {
-            let [r, g, b, a] = self.coarse[first + at];
-            Vec4::new(f32::from(r), f32::from(g), f32::from(b), f32::from(a)) * (1.0 / 65535.0)
-        }
+        self.view(level).texel(x, y)
     }
 
     /// Bytes that the coarser levels take.
     pub(crate) fn coarse_bytes(&self) -> usize {
         self.coarse.len() * size_of::<[u16; 4]>()
     }
+}
+
+/// The texels of a level, as they are stored.
+#[derive(Clone, Copy, Debug)]
+enum Texels<'a> {
+    Fine(&'a [[u8; 4]], &'static [f32; 256]),
+    Coarse(&'a [[u16; 4]]),
+}
+
+/// A level of a pyramid, borrowed.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct LevelView<'a> {
+    pub(crate) width: u32,
+    pub(crate) height: u32,
+    texels: Texels<'a>,
+}
+
+impl LevelView<'_> {
+    /// A texel in linear RGBA; row 0 is the top.
+    #[inline(always)]
+    pub(crate) fn texel(&self, x: u32, y: u32) -> Vec4 {
+        let at = y as usize * self.width as usize + x as usize;
+        match self.texels {
+            Texels::Fine(texels, table) => fine(texels, table, at),
+            Texels::Coarse(texels) => coarse(texels[at]),
+        }
+    }
+
+    /// The texels of two columns in two rows, row by row.
+    #[inline(always)]
+    pub(crate) fn four(&self, [x0, x1]: [u32; 2], [y0, y1]: [u32; 2]) -> [Vec4; 4] {
+        // Numbers past 2^24 are not exact in f32.
+        let (x0, x1) = (x0.min(self.width - 1) as usize, x1.min(self.width - 1) as usize);
+        let row = |y: u32| y.min(self.height - 1) as usize * self.width as usize;
+        let (top, bottom) = (row(y0), row(y1));
+        let at = [top + x0, top + x1, bottom + x0, bottom + x1];
+        let mut out = [Vec4::ZERO; 4];
+        match self.texels {
+            Texels::Fine(texels, table) => {
+                for i in 0..4 {
+                    out[i] = fine(texels, table, at[i]);
+                }
+            }
+            Texels::Coarse(texels) => {
+                for i in 0..4 {
+                    out[i] = coarse(texels[at[i]]);
+                }
+            }
+        }
+        out
+    }
+}
+
+#[inline(always)]
+fn fine(texels: &[[u8; 4]], table: &[f32; 256], at: usize) -> Vec4 {
+    let [r, g, b, a] = texels[at];
+    Vec4::new(table[usize::from(r)], table[usize::from(g)], table[usize::from(b)], f32::from(a) * (1.0 / 255.0))
+}
+
+#[inline(always)]
+fn coarse([r, g, b, a]: [u16; 4]) -> Vec4 {
+    Vec4::new(f32::from(r), f32::from(g), f32::from(b), f32::from(a)) * (1.0 / 65535.0)
 }
 
 /// Source texels and weights of texel `i` of `to` averaged from `from` texels: two when `from` is even, three
