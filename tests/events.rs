@@ -842,6 +842,9 @@ fn an_endless_box_is_met_by_every_ray() {
         for dir in [Vec3::X, -Vec3::X, Vec3::new(0.5, -1.0, 2.0)] {
             let ray = Ray { t_far: 10.0, ..Ray::new(Vec3::splat(0.5), dir) };
             assert_eq!(sorted(walked(&lists, &ray)), [0, 1], "{form}");
+            let mut seen = Seen { limit: f64::INFINITY, ..Seen::default() };
+            lists.walk(&trav(&ray), &mut seen, &mut ());
+            assert_eq!(sorted(seen.objects), [0, 1], "{form}");
         }
     }
 }

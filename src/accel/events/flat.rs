@@ -83,8 +83,7 @@ impl FlatLists {
     }
 
     pub(super) fn view(&self) -> ListView<'_, Word> {
-        let [x, y, z] = &self.events;
-        ListView { events: [x, y, z], ranks: &self.ranks }
+        ListView::new(&self.events, &self.ranks, 0, self.ranks.len())
     }
 
     /// Cursors of a point and the boxes that hold it.
@@ -179,7 +178,7 @@ impl FlatLists {
                 if crossed + inside.len() < local.start_length() || crossed == 0 {
                     around.extend_from_slice(inside);
                     for (axis, (&now, old)) in now.iter().zip(seat.cursors).enumerate() {
-                        let events = &view.events[axis][now.min(old) as usize..now.max(old) as usize];
+                        let events = &view.list(axis)[now.min(old) as usize..now.max(old) as usize];
                         around.extend(events.iter().map(|event| event.owner()));
                     }
                     around.sort_unstable();
@@ -210,7 +209,7 @@ impl SeatedWalk<'_> {
     /// Notes where the walk stands, and of the boxes it met keeps those that it is still in.
     pub(super) fn leave(mut self, seats: &mut Vec<Seat>) {
         if let (Some(local), Some(met)) = (&self.walk.local, self.met.take()) {
-            met.retain(|&number| local.is_inside(&self.walk.view.ranks[number as usize]));
+            met.retain(|&number| local.is_inside(&self.walk.view.all_ranks()[number as usize]));
             seats.push(Seat { volume: 0, cursors: local.cursors() });
         }
     }

@@ -135,3 +135,100 @@ pub(crate) fn reseat(events: &[Event], place: f32, from: usize) -> (usize, usize
     }
     (at, at.abs_diff(from))
 }
+
+#[cfg(test)]
+mod tests {
+    use glam::Vec3;
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn event(value: f32, owner: u32, is_max: bool) -> Event {
+        Event { value, ..Event::unplaced(owner, is_max) }
+    }
+
+    #[test]
+    fn l02_events_are_ordered_by_value_then_lower_ends_then_box() {
+        let due = [
+            event(f32::NEG_INFINITY, 9, false),
+            event(-2.0, 9, true),
+            event(-1e-45, 3, true),
+            event(0.0, 1, false),
+            event(0.0, 2, false),
+            event(0.0, 0, true),
+            event(1e-45, 0, false),
+            event(7.0, (1 << 31) - 1, true),
+            event(f32::INFINITY, 4, false),
+        ];
+        let mut events = due;
+        events.reverse();
+        sort(&mut events);
+        assert_eq!(events, due);
+    }
+
+    #[test]
+    fn l05_a_point_on_an_end_has_passed_lower_ends_and_not_upper_ones() {
+        let events = [event(1.0, 0, false), event(2.0, 1, false), event(2.0, 2, false), event(2.0, 0, true)];
+        let seats = [0.5, 1.0, 1.5, 2.0, 2.5].map(|place| seat(&events, place));
+        assert_eq!(seats, [0, 1, 1, 3, 4]);
+    }
+
+    #[test]
+    fn ends_are_never_minus_zero_and_empty_boxes_lie_beyond_everything() {
+        let flat = Aabb { min: Vec3::splat(-0.0), max: Vec3::splat(-0.0) };
+        assert_eq!(ends(flat, 1).map(f32::to_bits), [0, 0]);
+        let without_depth = Aabb { min: Vec3::new(0.0, 0.0, 1.0), max: Vec3::ZERO };
+        let broken = Aabb { min: Vec3::splat(f32::NAN), max: Vec3::ONE };
+        for aabb in [Aabb::EMPTY, without_depth, broken] {
+            assert_eq!(ends(aabb, 0), [f32::INFINITY; 2]);
+        }
+    }
+
+    /// Swaps that a sort of neighbours needs, counted pair by pair.
+    fn inversions(events: &[Event]) -> u64 {
+        let pairs = events.iter().enumerate().flat_map(|(i, a)| events[i + 1..].iter().map(move |b| (a, b)));
+        pairs.map(|(a, b)| u64::from(a.key() > b.key())).sum()
+    }
+
+    proptest! {
+        #[test]
+        fn sorting_again_gives_what_sorting_gives_and_counts_inversions(
+            values in prop::collection::vec(-4_i8..4, 1..80),
+            swaps in prop::collection::vec((0_usize..79, 1_usize..4), 0..60),
+        ) {
+            let mut due: Vec<_> = (0..).zip(&values).map(|(i, &v)| event(f32::from(v), i, i % 3 == 0)).collect();
+            sort(&mut due);
+            prop_assert!(due.windows(2).all(|pair| pair[0].key() < pair[1].key()));
+            // A little out of order.
+            let mut events = due.clone();
+            for (at, by) in swaps {
+                let at = at % events.len();
+                let to = (at + by).min(events.len() - 1);
+                events.swap(at, to);
+            }
+            let disorder = inversions(&events);
+            let budget = events.len() as u64 * u64::from(events.len().max(2).ilog2());
+            let done = resort(&mut events);
+            prop_assert_eq!(&events, &due);
+            if disorder <= budget {
+                prop_assert_eq!(done, Inversions { swaps: disorder, whole: 0 });
+            } else {
+                prop_assert_eq!(done.whole, 1);
+            }
+            prop_assert_eq!(resort(&mut events), Inversions::default());
+        }
+
+        #[test]
+        fn l06_a_seat_found_from_anywhere_is_the_seat(
+            values in prop::collection::vec(-4_i8..4, 0..40),
+            place in -5_i8..5,
+            from in 0_usize..50,
+        ) {
+            let mut events: Vec<_> = (0..).zip(&values).map(|(i, &v)| event(f32::from(v), i, i % 2 == 0)).collect();
+            sort(&mut events);
+            let due = seat(&events, f32::from(place));
+            let (at, steps) = reseat(&events, f32::from(place), from);
+            prop_assert_eq!((at, steps), (due, due.abs_diff(from.min(events.len()))));
+        }
+    }
+}

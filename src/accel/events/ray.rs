@@ -52,6 +52,12 @@ impl EventRay {
         (f64::from(value) - self.wide_origin[axis]) * self.inv[axis]
     }
 
+    /// True when the ray has surely passed `value` before `now`.
+    #[inline(always)]
+    pub(super) fn is_behind(&self, axis: usize, value: f32, now: f64) -> bool {
+        self.t(axis, value) * WIDEN < now
+    }
+
     /// When the ray leaves a box that it meets, not too early.
     #[inline(always)]
     pub(super) fn leaves(&self, aabb: Aabb) -> f64 {

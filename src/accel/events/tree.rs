@@ -62,10 +62,7 @@ pub(crate) struct EventTree {
 impl EventTree {
     #[inline(always)]
     pub(super) fn view(&self, volume: &Volume) -> ListView<'_, Word> {
-        let (first, end) = (volume.first as usize, (volume.first + volume.count) as usize);
-        let [x, y, z] = &self.events;
-        let events = 2 * first..2 * end;
-        ListView { events: [&x[events.clone()], &y[events.clone()], &z[events]], ranks: &self.ranks[first..end] }
+        ListView::new(&self.events, &self.ranks, volume.first as usize, volume.count as usize)
     }
 
     /// Cursors of a point in every volume that holds it.
@@ -155,6 +152,18 @@ impl Scratch {
         scratch.free.clear();
         scratch
     }
+
+    /// Brings the last volume of the order, whose next event is now due at `t`, to its place.
+    #[inline(always)]
+    fn sink(&mut self, t: f64) {
+        let Some((last, rest)) = self.order.split_last_mut() else { return };
+        last.0 = t;
+        let mut at = rest.len();
+        while at > 0 && self.order[at - 1].0 < t {
+            self.order.swap(at - 1, at);
+            at -= 1;
+        }
+    }
 }
 
 /// The objects whose boxes a ray meets, in the order in which it enters them.
@@ -176,20 +185,24 @@ impl BoxWalk for TreeWalk<'_> {
     #[inline(always)]
     fn next<C: Counter>(&mut self, limit: f64, count: &mut C) -> Option<u32> {
         let limit = limit * WIDEN;
-        while let Some((t, place)) = self.scratch.order.pop() {
-            if t > limit {
-                self.scratch.order.push((t, place));
+        while let Some(&(t, place)) = self.scratch.order.last() {
+            // A volume without end has its last event at infinity.
+            if t > limit || t == f64::INFINITY {
                 return None;
             }
-            let bound = self.scratch.order.last().map_or(limit, |&(next, _)| if next < limit { next } else { limit });
+            let bound = match self.scratch.order[..] {
+                [.., (next, _), _] if next < limit => next,
+                _ => limit,
+            };
             let open = &mut self.scratch.open[place as usize];
             let volume = &self.tree.volumes[open.volume as usize];
             let entered = open.local.next(&self.tree.view(volume), &self.ray, bound, count);
-            if open.local.is_over() {
-                self.scratch.free.push(place);
+            let (t, end) = (open.local.t(), open.local.end());
+            if t <= end {
+                self.scratch.sink(t);
             } else {
-                let t = open.local.t();
-                self.insert(t, place);
+                self.scratch.order.pop();
+                self.scratch.free.push(place);
             }
             if let Some(Entered { child, at }) = entered {
                 match self.tree.links[(volume.first + child) as usize].target() {
@@ -216,7 +229,8 @@ impl TreeWalk<'_> {
                 ListWalk::start(&view, aabb, &self.ray, hint, count)
             }
         };
-        if local.is_over() {
+        let t = local.t();
+        if t > local.end() {
             return;
         }
         let open = Open { local, volume };
@@ -229,19 +243,8 @@ impl TreeWalk<'_> {
             let place = (self.scratch.open.len() - 1) as u32;
             place
         };
-        self.insert(open.local.t(), place);
-    }
-
-    #[inline(always)]
-    fn insert(&mut self, t: f64, place: u32) {
-        let order = &mut self.scratch.order;
-        order.push((t, place));
-        let mut at = order.len() - 1;
-        while at > 0 && order[at - 1].0 < t {
-            order[at] = order[at - 1];
-            at -= 1;
-        }
-        order[at] = (t, place);
+        self.scratch.order.push((t, place));
+        self.scratch.sink(t);
     }
 
     /// Notes where the walk stands: the open volumes and their cursors.

@@ -9,14 +9,12 @@ use crate::geom::Aabb;
 
 /// Checks the lists of some boxes; the first violation in words.
 fn lists<W: RankWord>(view: &ListView<'_, W>, boxes: impl Fn(usize) -> Aabb) -> Result<(), String> {
-    for (axis, events) in view.events.into_iter().enumerate() {
-        if events.len() != 2 * view.ranks.len() {
-            return Err(format!("axis {axis}: {} events of {} boxes", events.len(), view.ranks.len()));
-        }
+    for axis in 0..3 {
+        let events = view.list(axis);
         if let Some(at) = events.windows(2).position(|pair| pair[0].key() >= pair[1].key()) {
             return Err(format!("axis {axis}: events {at} and {} are out of order", at + 1));
         }
-        for (child, ranks) in view.ranks.iter().enumerate() {
+        for (child, ranks) in view.all_ranks().iter().enumerate() {
             let is_at = |rank: u32, is_max: bool, value: f32| {
                 let due = |e: &Event| {
                     e.owner() as usize == child && e.is_max() == is_max && e.value().to_bits() == value.to_bits()
@@ -45,6 +43,9 @@ pub(super) fn flat(flat: &FlatLists, boxes: impl Fn(u32) -> Aabb) -> Result<(), 
 
 /// Checks the hierarchy over `count` objects.
 pub(super) fn tree(tree: &EventTree, count: usize, boxes: impl Fn(u32) -> Aabb) -> Result<(), String> {
+    if tree.events.iter().any(|list| list.len() != 2 * tree.links.len()) || tree.ranks.len() != tree.links.len() {
+        return Err("lists of different lengths".into());
+    }
     let mut seen = vec![false; count];
     let (mut next_child, mut next_volume) = (0, 1);
     // Volumes still to come, the next last: what is within a volume follows it before anything else does.

@@ -14,11 +14,54 @@ use crate::{accel::Counter, geom::Aabb};
 /// Lists of at most this many events are walked over when a volume is opened; longer ones are searched.
 const LINEAR: usize = 32;
 
-/// The lists of one volume: its boxes are numbered from 0.
+/// The lists of one volume within those of a whole structure; its boxes are numbered from 0.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ListView<'a, W> {
-    pub(crate) events: [&'a [Event]; 3],
-    pub(crate) ranks: &'a [Ranks<W>],
+    /// Of the structure, two for each of its boxes.
+    events: [&'a [Event]; 3],
+    ranks: &'a [Ranks<W>],
+    /// Number of the volume's first box.
+    first: usize,
+    /// Number of its events on each axis.
+    len: usize,
+}
+
+impl<'a, W> ListView<'a, W> {
+    /// The lists of the `count` boxes from `first` on.
+    #[inline(always)]
+    pub(crate) fn new(events: &'a [Vec<Event>; 3], ranks: &'a [Ranks<W>], first: usize, count: usize) -> Self {
+        let [x, y, z] = events;
+        Self { events: [x, y, z], ranks, first, len: 2 * count }
+    }
+
+    /// The events on an axis.
+    #[inline(always)]
+    pub(crate) fn list(&self, axis: usize) -> &'a [Event] {
+        &self.events[axis][2 * self.first..2 * self.first + self.len]
+    }
+
+    /// The ranks of all boxes.
+    pub(crate) fn all_ranks(&self) -> &'a [Ranks<W>] {
+        &self.ranks[self.first..self.first + self.len / 2]
+    }
+
+    /// One event of an axis.
+    #[inline(always)]
+    fn event(&self, axis: usize, at: u32) -> Event {
+        self.events[axis][2 * self.first + at as usize]
+    }
+
+    /// The ranks of a box.
+    #[inline(always)]
+    fn ranks(&self, child: u32) -> &'a Ranks<W> {
+        &self.ranks[self.first + child as usize]
+    }
+
+    /// When the ray passes an event; never, when there is none of that number.
+    #[inline(always)]
+    fn due(&self, ray: &EventRay, axis: usize, at: u32) -> f64 {
+        if (at as usize) < self.len { ray.t(axis, self.event(axis, at).value()) } else { f64::INFINITY }
+    }
 }
 
 /// A box that the ray is now inside of.
@@ -46,6 +89,8 @@ pub(crate) struct ListWalk<W> {
     next: [u32; 3],
     /// When that event is due; infinite when there is none.
     due: [f64; 3],
+    /// When the one after it is due. So the choice of the next event does not wait for memory.
+    later: [f64; 3],
     /// When the last event on each axis was due, widened.
     recent: [f64; 3],
     /// The ray has left the volume after this.
@@ -57,26 +102,22 @@ pub(crate) struct ListWalk<W> {
 /// Passes over the events of `list` that lie behind `now` as the ray runs; returns the cursor.
 #[inline(always)]
 fn skip<C: Counter>(list: &[Event], ray: &EventRay, axis: usize, now: f64, count: &mut C) -> u32 {
-    let back = ray.runs_back(axis);
-    let at = |i: usize| if back { list[list.len() - 1 - i] } else { list[i] };
-    let mut passed = 0;
-    if list.len() > LINEAR {
-        let behind = |e: &Event| ray.t(axis, e.value()) * WIDEN < now;
-        passed = if back { list.len() - list.partition_point(|e| !behind(e)) } else { list.partition_point(behind) };
-    }
-    while passed < list.len() {
-        let event = at(passed);
-        let t = ray.t(axis, event.value());
-        let gone = if event.is_max() == back { t <= now } else { t * WIDEN < now };
-        if !gone {
-            break;
+    let passed = if list.len() <= LINEAR {
+        // All are looked at: that takes no branch that depends on the ray.
+        let mut passed = 0;
+        for event in list {
+            passed += usize::from(ray.is_behind(axis, event.value(), now));
         }
-        passed += 1;
-    }
+        passed
+    } else if ray.runs_back(axis) {
+        list.len() - list.partition_point(|event| !ray.is_behind(axis, event.value(), now))
+    } else {
+        list.partition_point(|event| ray.is_behind(axis, event.value(), now))
+    };
     for _ in 0..passed {
         count.skip();
     }
-    cursor(if back { list.len() - passed } else { passed })
+    cursor(if ray.runs_back(axis) { list.len() - passed } else { passed })
 }
 
 /// The number of events that do not belong to empty boxes, when no box is endless upward: empty ones lie above all others.
@@ -88,6 +129,15 @@ fn finite(list: &[Event]) -> usize {
     }
     count
 }
+
+/// The event after number `at`; past the list, wherever that is, when there is none.
+#[inline(always)]
+fn after(at: u32, back: bool) -> u32 {
+    if back { at.wrapping_sub(1) } else { at.wrapping_add(1) }
+}
+
+/// The two axes besides each.
+const OTHERS: [(usize, usize); 3] = [(1, 2), (2, 0), (0, 1)];
 
 /// As a cursor; lists are shorter than 2^32.
 #[inline(always)]
@@ -106,7 +156,7 @@ pub(super) fn seat_point<W: RankWord, C: Counter>(
 ) -> [u32; 3] {
     let mut cursors = [0; 3];
     for axis in 0..3 {
-        let list = view.events[axis];
+        let list = view.list(axis);
         cursors[axis] = if let Some(hint) = hint {
             let (at, steps) = reseat(list, point[axis], hint[axis] as usize);
             for _ in 0..steps {
@@ -133,7 +183,7 @@ impl<W: RankWord> ListWalk<W> {
     ) -> Self {
         let mut cursors = [0; 3];
         for i in 0..3 {
-            let list = view.events[i];
+            let list = view.list(i);
             cursors[i] = if i == axis {
                 if ray.runs_back(i) { cursor(finite(list)) } else { 0 }
             } else if ray.moves(i) {
@@ -159,7 +209,7 @@ impl<W: RankWord> ListWalk<W> {
         if ray.t_near > 0.0 {
             for axis in 0..3 {
                 if ray.moves(axis) {
-                    cursors[axis] = skip(view.events[axis], ray, axis, ray.t_near, count);
+                    cursors[axis] = skip(view.list(axis), ray, axis, ray.t_near, count);
                 }
             }
         }
@@ -174,6 +224,7 @@ impl<W: RankWord> ListWalk<W> {
             cursors: W::pack(cursors),
             next: [u32::MAX; 3],
             due: [f64::INFINITY; 3],
+            later: [f64::INFINITY; 3],
             recent: [f64::NEG_INFINITY; 3],
             end: ray.leaves(aabb),
             start,
@@ -181,18 +232,14 @@ impl<W: RankWord> ListWalk<W> {
         };
         for axis in 0..3 {
             if ray.moves(axis) {
-                walk.next[axis] = cursors[axis].wrapping_sub(u32::from(ray.runs_back(axis)));
-                walk.look(view, ray, axis);
+                let back = ray.runs_back(axis);
+                let next = cursors[axis].wrapping_sub(u32::from(back));
+                walk.next[axis] = next;
+                walk.due[axis] = view.due(ray, axis, next);
+                walk.later[axis] = view.due(ray, axis, after(next, back));
             }
         }
         walk
-    }
-
-    /// Finds out when the next event on `axis` is due.
-    #[inline(always)]
-    fn look(&mut self, view: &ListView<'_, W>, ray: &EventRay, axis: usize) {
-        let event = view.events[axis].get(self.next[axis] as usize);
-        self.due[axis] = event.map_or(f64::INFINITY, |e| ray.t(axis, e.value()));
     }
 
     /// The next event is due then; while boxes around the start are left, the start.
@@ -201,10 +248,10 @@ impl<W: RankWord> ListWalk<W> {
         if self.scan.next < self.scan.end { self.start } else { self.due[self.soonest()] }
     }
 
-    /// True when nothing of the volume is left to come.
+    /// The ray has left the volume after this.
     #[inline(always)]
-    pub(crate) fn is_over(&self) -> bool {
-        self.t() > self.end
+    pub(crate) fn end(&self) -> f64 {
+        self.end
     }
 
     /// Cursors on the three axes.
@@ -259,16 +306,19 @@ impl<W: RankWord> ListWalk<W> {
             }
             count.event();
             let back = ray.runs_back(axis);
-            let event = view.events[axis][self.next[axis] as usize];
+            let at = self.next[axis];
+            let next = after(at, back);
+            self.due[axis] = self.later[axis];
+            self.later[axis] = view.due(ray, axis, after(next, back));
+            self.next[axis] = next;
             self.cursors = self.cursors.stepped(axis, back);
-            self.next[axis] = if back { self.next[axis].wrapping_sub(1) } else { self.next[axis] + 1 };
-            self.look(view, ray, axis);
+            let event = view.event(axis, at);
             // After an exit its box no longer holds the ray.
             let child = event.owner();
-            if view.ranks[child as usize].hold(self.cursors) {
+            if view.ranks(child).hold(self.cursors) {
                 return Some(Entered { child, at: Some((axis, t)) });
             }
-            let others = self.recent[(axis + 1) % 3].max(self.recent[(axis + 2) % 3]);
+            let others = self.recent[OTHERS[axis].0].max(self.recent[OTHERS[axis].1]);
             self.recent[axis] = t * WIDEN;
             if t <= others && event.is_max() == back && self.is_near_miss(view, ray, axis, child, t) {
                 return Some(Entered { child, at: Some((axis, t)) });
@@ -281,7 +331,7 @@ impl<W: RankWord> ListWalk<W> {
     #[cold]
     #[inline(never)]
     fn is_near_miss(&self, view: &ListView<'_, W>, ray: &EventRay, axis: usize, child: u32, t: f64) -> bool {
-        let ranks = &view.ranks[child as usize];
+        let ranks = view.ranks(child);
         (0..3).all(|i| {
             let cursor = self.cursors.get(i);
             let [min, max] = ranks.get(i);
@@ -289,7 +339,7 @@ impl<W: RankWord> ListWalk<W> {
                 return true;
             }
             let (was_entered, exit) = if ray.runs_back(i) { (cursor <= max, min) } else { (min < cursor, max) };
-            let exit = view.events[i][exit as usize];
+            let exit = view.event(i, exit);
             ray.moves(i) && was_entered && ray.t(i, exit.value()) * WIDEN >= t
         })
     }
@@ -301,9 +351,9 @@ impl<W: RankWord> ListWalk<W> {
         let above = next >= self.cursors.get(axis);
         for at in next..end {
             count.skip();
-            let event = view.events[axis][at as usize];
+            let event = view.event(axis, at);
             let child = event.owner();
-            if event.is_max() == above && view.ranks[child as usize].hold(self.cursors) {
+            if event.is_max() == above && view.ranks(child).hold(self.cursors) {
                 self.scan.next = at + 1;
                 return Some(child);
             }
@@ -318,7 +368,7 @@ impl Scan {
     fn new<W>(view: &ListView<'_, W>, cursors: [u32; 3]) -> Self {
         let mut best = Self { axis: 0, next: 0, end: cursors[0] };
         for (axis, at) in cursors.into_iter().enumerate() {
-            let len = cursor(view.events[axis].len());
+            let len = cursor(view.list(axis).len());
             for (next, end) in [(0, at), (at, len)] {
                 if end - next < best.end - best.next {
                     best = Self { axis, next, end };
