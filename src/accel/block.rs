@@ -129,7 +129,9 @@ impl TriBlock {
         if left != 0 {
             let point = rows[0][(!left).trailing_zeros() as usize & 3];
             for lane in (0..4).filter(|lane| left >> lane & 1 == 1) {
-                rows.iter_mut().for_each(|row| row[lane] = point);
+                for row in &mut rows {
+                    row[lane] = point;
+                }
             }
         }
         for (corner, [a, b, c, d]) in self.corners.iter_mut().zip(rows) {

@@ -69,9 +69,8 @@ impl Emitted {
     /// Counts the blocks below every child, from the bottom up.
     fn count_blocks(&mut self) {
         for i in (0..self.pairs.len()).rev() {
-            let below = |link: Link| match link.is_leaf() {
-                true => link.blocks().len() as u32,
-                false => self.pairs[link.pair()].blocks.iter().sum(),
+            let below = |link: Link| {
+                if link.is_leaf() { link.blocks().len() as u32 } else { self.pairs[link.pair()].blocks.iter().sum() }
             };
             self.pairs[i].blocks = self.pairs[i].links.map(below);
         }

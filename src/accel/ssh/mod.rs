@@ -181,7 +181,7 @@ impl Ssh {
             refit::refit_blocks(blocks, prims);
             sweep(pairs, Slots(blocks), choose.then_some(boxes), keep, prims)
         } else {
-            let leaves = Blocks { blocks, spans, first: 0 };
+            let leaves = Blocks { own: blocks, spans, first: 0 };
             sweep(pairs, leaves, choose.then_some(boxes), keep, prims)
         };
         self.measured = if choose {
@@ -225,7 +225,7 @@ fn sweep<L: Leaves>(
         Subtree { pairs, first: 0, leaves, store }.refit(prims)
     }
     match boxes {
-        Some(boxes) => with(pairs, leaves, Boxes { boxes, first: 0 }, prims),
+        Some(boxes) => with(pairs, leaves, Boxes { own: boxes, first: 0 }, prims),
         None => with(pairs, leaves, keep, prims),
     }
 }

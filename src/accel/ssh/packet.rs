@@ -20,8 +20,9 @@ use crate::{
 /// Groups of fewer rays of common direction signs are walked one by one.
 const FEW: u32 = 3;
 
-/// Rays of common direction signs, one to a lane, against single planes. The proof at `FastSlabs` holds lane by lane; lanes of
-/// rays with other signs hold nonsense and are masked.
+/// Rays of common direction signs, one to a lane, against single planes. The proof at `FastSlabs` holds lane by lane, with the slack added
+/// to exits and limits, where it costs no instruction: that rounds once more at most, which the widening of exits covers. Lanes of rays with
+/// other signs hold nonsense and are masked.
 struct PacketSlabs<S: Simd> {
     origin: [S::F; 3],
     /// By [`Side::row`]: factors for entries and exits, NaN for those that are not.
@@ -42,7 +43,7 @@ struct Segments<S: Simd> {
 impl<S: Simd> Segments<S> {
     #[inline(always)]
     fn open(self) -> u32 {
-        (self.near - self.far).le(S::F::splat(SLACK))
+        self.near.le(self.far)
     }
 }
 
@@ -58,7 +59,7 @@ impl<S: Simd> PacketSlabs<S> {
             exit: [nan; Side::ROWS],
             backward,
             t_near: S::F::load(&packet.t_near32),
-            limit: S::F::load(&packet.t_cull),
+            limit: S::F::load(&packet.t_cull) + S::F::splat(SLACK),
         };
         let one = S::F::splat(1.0);
         // As `TravRay::new`.
@@ -79,12 +80,12 @@ impl<S: Simd> PacketSlabs<S> {
         let distance = S::F::splat(plane) - self.origin[side.axis()];
         Segments {
             near: (distance * self.entry[side.row()]).max(segments.near),
-            far: (distance * self.exit[side.row()]).min(segments.far),
+            far: distance.mul_add_loose(self.exit[side.row()], S::F::splat(SLACK)).min(segments.far),
         }
     }
 
     #[inline(always)]
-    fn cut_by(&self, node: &Node, segments: Segments<S>) -> Segments<S> {
+    fn cut_by(&self, node: Node, segments: Segments<S>) -> Segments<S> {
         self.cut(node.plane, node.word.side(), segments)
     }
 
@@ -227,13 +228,13 @@ impl Ssh {
                         block.closest_packet::<S, C, K>(rays, &mut packet, mask, best, sinks, count);
                     }
                 }
-                slabs.limit = S::F::load(&packet.t_cull);
+                slabs.limit = S::F::load(&packet.t_cull) + S::F::splat(SLACK);
             } else {
                 count.node();
                 count.node();
                 let nodes = &self.pairs[word.index()].0;
                 let nearer = usize::from(slabs.backward[word.order()]);
-                let (first, second) = (&nodes[nearer], &nodes[1 - nearer]);
+                let (first, second) = (nodes[nearer], nodes[1 - nearer]);
                 let (segments1, segments2) = (slabs.cut_by(first, segments), slabs.cut_by(second, segments));
                 let (mask1, mask2) = (segments1.open() & mask, segments2.open() & mask);
                 if mask1 != 0 {
@@ -326,7 +327,7 @@ impl Ssh {
                 count.node();
                 let nodes = &self.pairs[word.index()].0;
                 let nearer = usize::from(slabs.backward[word.order()]);
-                let (first, second) = (&nodes[nearer], &nodes[1 - nearer]);
+                let (first, second) = (nodes[nearer], nodes[1 - nearer]);
                 let (segments1, segments2) = (slabs.cut_by(first, segments), slabs.cut_by(second, segments));
                 let (mask1, mask2) = (segments1.open() & mask, segments2.open() & mask);
                 if mask1 != 0 {

@@ -61,7 +61,7 @@ pub(super) trait Leaves: Sized + Send {
 
 /// Leaves of whole blocks.
 pub(super) struct Blocks<'a> {
-    pub(super) blocks: &'a mut [TriBlock],
+    pub(super) own: &'a mut [TriBlock],
     pub(super) spans: &'a [u8],
     pub(super) first: usize,
 }
@@ -71,7 +71,7 @@ impl Leaves for Blocks<'_> {
     fn refit(&mut self, place: usize, prims: &Triangles<'_>) -> Swept {
         let span = self.spans.get(place).map_or(1, |&span| usize::from(span));
         let mut swept = Swept::EMPTY;
-        for block in &mut self.blocks[place - self.first..][..span] {
+        for block in &mut self.own[place - self.first..][..span] {
             let bounds = block.refit(prims);
             swept = swept.plus(Swept { aabb: bounds.aabb, own_area: bounds.own_area });
         }
@@ -79,9 +79,9 @@ impl Leaves for Blocks<'_> {
     }
 
     fn split(self, place: usize) -> (Self, Self) {
-        let Self { blocks, spans, first } = self;
-        let (low, high) = blocks.split_at_mut(place - first);
-        (Self { blocks: low, spans, first }, Self { blocks: high, spans, first: place })
+        let Self { own, spans, first } = self;
+        let (low, high) = own.split_at_mut(place - first);
+        (Self { own: low, spans, first }, Self { own: high, spans, first: place })
     }
 }
 
@@ -136,19 +136,19 @@ impl Store for Keep {
 
 /// Boxes are kept for a choice of sides.
 pub(super) struct Boxes<'a> {
-    pub(super) boxes: &'a mut [[Aabb; 2]],
+    pub(super) own: &'a mut [[Aabb; 2]],
     pub(super) first: usize,
 }
 
 impl Store for Boxes<'_> {
     #[inline(always)]
     fn store(&mut self, pair: usize, child: usize, aabb: &Aabb, _node: &mut super::node::Node) {
-        self.boxes[pair - self.first][child] = *aabb;
+        self.own[pair - self.first][child] = *aabb;
     }
 
     fn split(self, pair: usize) -> (Self, Self) {
-        let (low, high) = self.boxes.split_at_mut(pair - self.first);
-        (Self { boxes: low, first: self.first }, Self { boxes: high, first: pair })
+        let (low, high) = self.own.split_at_mut(pair - self.first);
+        (Self { own: low, first: self.first }, Self { own: high, first: pair })
     }
 }
 

@@ -1,3 +1,9 @@
+#![expect(
+    clippy::cast_possible_truncation,
+    clippy::float_cmp,
+    reason = "roundings are wanted; planes are compared bit for bit"
+)]
+
 use glam::Vec3;
 use proptest::prelude::*;
 

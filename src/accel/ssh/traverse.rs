@@ -48,7 +48,7 @@ pub(super) trait SlabTest: Copy {
     fn is_backward(&self, axis: usize) -> bool;
 
     #[inline(always)]
-    fn cut_by(&self, node: &Node, segment: Segment<Self::T>) -> Segment<Self::T> {
+    fn cut_by(&self, node: Node, segment: Segment<Self::T>) -> Segment<Self::T> {
         self.cut(node.plane, node.word.side(), segment)
     }
 
@@ -152,12 +152,10 @@ impl SlabTest for FastSlabs {
     #[inline(always)]
     fn may_meet<S: Simd>(&self, block: &TriBlock, lane: Option<usize>, Segment { near, far }: Segment<f32>) -> bool {
         let (mut near, mut far) = (S::F4::splat(near), S::F4::splat(far));
-        let planes = block.boxes::<S>();
-        for axis in 0..3 {
+        for (axis, [low, high]) in block.boxes::<S>().into_iter().enumerate() {
             let backward = self.backward[axis];
             let (entry, exit) =
                 (&self.rows[axis + 4 * usize::from(backward)], &self.rows[axis + 4 * usize::from(!backward)]);
-            let [low, high] = planes[axis];
             let (first, second) = if backward { (high, low) } else { (low, high) };
             let origin = S::F4::splat(entry.origin);
             near = ((first - origin) * S::F4::splat(entry.entry)).max(near);
@@ -329,7 +327,7 @@ impl Ssh {
                 count.node();
                 let nodes = &self.pairs[word.index()].0;
                 let nearer = usize::from(test.is_backward(word.order()));
-                let (first, second) = (&nodes[nearer], &nodes[1 - nearer]);
+                let (first, second) = (nodes[nearer], nodes[1 - nearer]);
                 let (segment1, segment2) = (test.cut_by(first, segment), test.cut_by(second, segment));
                 let (open1, open2) = (N::is_open(segment1), N::is_open(segment2));
                 if open1 {
@@ -387,7 +385,7 @@ impl Ssh {
                 count.node();
                 let nodes = &self.pairs[word.index()].0;
                 let nearer = usize::from(test.is_backward(word.order()));
-                let (first, second) = (&nodes[nearer], &nodes[1 - nearer]);
+                let (first, second) = (nodes[nearer], nodes[1 - nearer]);
                 let (segment1, segment2) = (test.cut_by(first, segment), test.cut_by(second, segment));
                 let (open1, open2) = (N::is_open(segment1), N::is_open(segment2));
                 if open1 {

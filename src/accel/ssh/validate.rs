@@ -60,7 +60,7 @@ impl Walk<'_> {
                 let aabb = self.pair(node.word, &inside, depth + 1)?;
                 (aabb, side.of(&aabb))
             };
-            check(number, &node, due, &aabb, region, &inside)?;
+            check(number, node, due, &aabb, region, &inside)?;
             both = both.union(aabb);
         }
         Ok(both)
@@ -105,7 +105,7 @@ impl Walk<'_> {
 }
 
 /// A node's plane, the box below it, and the regions outside and inside of the plane.
-fn check(pair: usize, node: &Node, due: f32, below: &Aabb, outer: &Aabb, inside: &Aabb) -> Result<(), String> {
+fn check(pair: usize, node: Node, due: f32, below: &Aabb, outer: &Aabb, inside: &Aabb) -> Result<(), String> {
     if node.plane.to_bits() != (due + 0.0).to_bits() {
         return Err(format!("pair {pair}: plane {} of {:?}, due {due}", node.plane, node.word.side()));
     }

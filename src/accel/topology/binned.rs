@@ -83,11 +83,11 @@ impl<const N: usize> Bins<N> {
         out
     }
 
-    fn merge(mut self, other: Self) -> Self {
+    fn merge(mut self, Self { bounds, counts }: Self) -> Self {
         for axis in 0..3 {
             for bin in 0..N {
-                self.bounds[axis][bin] = self.bounds[axis][bin].union(other.bounds[axis][bin]);
-                self.counts[axis][bin] += other.counts[axis][bin];
+                self.bounds[axis][bin] = self.bounds[axis][bin].union(bounds[axis][bin]);
+                self.counts[axis][bin] += counts[axis][bin];
             }
         }
         self

@@ -146,7 +146,7 @@ struct Run<'a> {
     first: u32,
 }
 
-impl<'a> Run<'a> {
+impl Run<'_> {
     #[expect(clippy::cast_possible_truncation, reason = "places are counted in u32")]
     fn split(self, middle: usize) -> (Self, Self) {
         let (refs0, refs1) = self.refs.split_at_mut(middle);
