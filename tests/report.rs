@@ -186,3 +186,36 @@ fn an_interrupt_leaves_no_file() {
     assert_eq!(child.wait().expect("ends").code(), Some(130));
     assert_eq!(fs::read_dir(dir.path()).expect("a folder").count(), 0);
 }
+
+#[test]
+#[cfg_attr(debug_assertions, ignore = "takes minutes without optimisation")]
+fn the_papers_tables_stand_beside_ours_and_name_what_is_substituted() {
+    let dir = tempfile::tempdir().expect("a folder");
+    // Here no models are at hand.
+    kinora().current_dir(&dir).args(["report", "papers", "--quick", "--output", "out"]).assert().success();
+    let bytes = fs::read(dir.path().join("out/papers.json")).expect("written");
+    let report: Value = serde_json::from_slice(&bytes).expect("JSON");
+    let rows = report["rows"].as_array().expect("rows");
+    let of = |table: &'static str| rows.iter().filter(move |r| r["table"] == table);
+    for table in ["slabs", "lists", "lists-growth", "groups-memory", "groups-reads", "databases"] {
+        assert!(of(table).count() > 1, "{table}");
+    }
+    for row in of("slabs").chain(of("groups-memory")).filter(|r| r["model"].is_string()) {
+        let same = row["triangles"] == row["paper_triangles"];
+        assert_eq!(row["standing"], if same { "as in the paper" } else { "substituted" }, "{row}");
+    }
+    let nodes = |structure: &'static str| {
+        of("slabs")
+            .filter(move |r| r["structure"] == structure && r["setup"] != "defaults")
+            .map(|r| r["node_mebibytes"].as_f64().expect("a size"))
+    };
+    for (bvh2, ssh) in nodes("bvh2").zip(nodes("ssh")) {
+        assert!((ssh / bvh2 - 0.25).abs() < 1e-12, "{ssh} of {bvh2}");
+    }
+    for row in of("lists").filter(|r| r["set"] == "primary" && r["structure"] == "lists, flat") {
+        assert_eq!(row["tests_per_ray"], row["fewest_tests_per_ray"], "{row}");
+    }
+    let checks = report["checks"].as_array().expect("checks");
+    assert!(checks.iter().all(|c| c["verdict"].is_string()) && checks.len() > 10);
+    assert_eq!(report["plots"].as_array().map(Vec::len), Some(10));
+}

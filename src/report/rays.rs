@@ -131,7 +131,7 @@ fn reach(class: RayClass, scene: Sphere) -> f32 {
 
 /// The unit normal on the side that a ray comes from.
 fn facing(prims: &Triangles<'_>, prim: PrimId, dir: Vec3) -> Option<DVec3> {
-    let [a, b, c] = prims.corners(prim).map(|p| p.as_dvec3());
+    let [a, b, c] = prims.corners(prim).map(Vec3::as_dvec3);
     let normal = (b - a).cross(c - a).try_normalize()?;
     Some(if normal.dot(dir.as_dvec3()) > 0.0 { -normal } else { normal })
 }

@@ -2,7 +2,10 @@
 
 mod monitor;
 
-use std::path::{Path, PathBuf};
+use std::{
+    fmt::Write,
+    path::{Path, PathBuf},
+};
 
 use clap::Args;
 use kinora::{
@@ -78,7 +81,7 @@ fn measure(
     match args.kind {
         Kind::Papers => {
             let options = papers::Options { quick: args.quick, simd: settings.simd };
-            papers::report(subjects, &options, watching)
+            papers::report(subjects, options, watching)
         }
         Kind::Structures => {
             let mut options = structures::Options { simd: settings.simd, ..structures::Options::new(args.quick) };
@@ -114,12 +117,15 @@ fn name<'a>(file: &'a str, all: &[String]) -> &'a str {
 
 /// What goes to stdout: the files, the bounds, and what changed.
 fn text(args: &ReportArgs, report: &Report, files: &[String], changes: Option<(&Baseline, &Changes)>) -> String {
-    let mut out: String = files.iter().map(|f| format!("{}\n", args.output.join(f).display())).collect();
+    let mut out = String::new();
+    for file in files {
+        let _ = writeln!(out, "{}", args.output.join(file).display());
+    }
     for check in &report.checks {
-        out += &format!("{check}\n");
+        let _ = writeln!(out, "{check}");
     }
     if let Some((baseline, changes)) = changes {
-        out += &format!("against {}:\n{changes}", baseline.origin());
+        let _ = write!(out, "against {}:\n{changes}", baseline.origin());
     }
     out
 }

@@ -36,6 +36,7 @@ impl Stopwatch {
 }
 
 #[cfg(unix)]
+#[expect(clippy::unnecessary_wraps, reason = "other systems do not tell")]
 fn thread_seconds() -> Option<f64> {
     let time = clock_gettime(ClockId::ThreadCPUTime);
     Some(time.tv_sec as f64 + time.tv_nsec as f64 * 1e-9)

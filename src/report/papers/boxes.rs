@@ -112,7 +112,7 @@ impl OverBoxes {
     ///
     /// # Errors
     /// When the structure cannot be built.
-    pub(super) fn run(&self, structure: Structure, set: RaySet, options: &Options) -> Result<Run, ReportError> {
+    pub(super) fn run(&self, structure: Structure, set: RaySet, options: Options) -> Result<Run, ReportError> {
         let (most, work) = if options.quick { (48, 4e6) } else { (160, 1e8) };
         let affordable = (work / self.objects().max(1) as f64).sqrt();
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to a picture's side")]

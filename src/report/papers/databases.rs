@@ -33,7 +33,7 @@ const COLUMNS: &[Column] = &[
 ///
 /// # Errors
 /// When `monitor` ends it or a scene or structure cannot be made.
-pub(super) fn measure(options: &Options, monitor: &mut dyn Monitor) -> Result<(Table, Vec<Check>), ReportError> {
+pub(super) fn measure(options: Options, monitor: &mut dyn Monitor) -> Result<(Table, Vec<Check>), ReportError> {
     let mut table = Table::new("databases", "Standard Procedural Databases: ray counts", COLUMNS).with_note(
         "513 x 513 rays from the eye at default sizes, after the rules inferred from the published counts (Havran and Sixta, 1999). The grid follows \
          Woo's rule at density 10, as theirs.",

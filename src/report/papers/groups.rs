@@ -27,6 +27,7 @@ const MEMORY: &[Column] = &[
     Column::new("scene", "scene", Role::Id, 0),
     Column::new("standing", "model or stand-in", Role::Note, 0),
     Column::new("triangles", "triangles", Role::Note, 0),
+    Column::new("paper_triangles", "(paper)", Role::Note, 0),
     Column::new("res", "cells an axis", Role::Id, 0),
     Column::new("groups", "groups", Role::Less, 0),
     Column::new("kdtree_mib", "`kdtree` [MiB]", Role::Less, 2),
@@ -83,7 +84,7 @@ struct SceneReads {
     reads: Vec<Reads>,
 }
 
-fn cases<'a>(models: &'a [Subject], quick: bool) -> Vec<Case<'a>> {
+fn cases(models: &[Subject], quick: bool) -> Vec<Case<'_>> {
     let stand_in = |row: &GroupScene| match row.scene {
         "FairyForest" => Source::Spd(SpdKind::Tree, 9, row.polygons),
         "Cabin" => Source::Spd(SpdKind::Gears, 6, row.polygons),
@@ -100,15 +101,14 @@ fn cases<'a>(models: &'a [Subject], quick: bool) -> Vec<Case<'a>> {
     rows.map(case).collect()
 }
 
+/// What the grouped uniform grid adds to the report.
+type Found = (Vec<Table>, Vec<Plot>, Vec<Check>);
+
 /// Tables, plot and bounds.
 ///
 /// # Errors
 /// When `monitor` ends it or a structure cannot be built.
-pub(super) fn measure(
-    models: &[Subject],
-    options: &Options,
-    monitor: &mut dyn Monitor,
-) -> Result<(Vec<Table>, Vec<Plot>, Vec<Check>), ReportError> {
+pub(super) fn measure(models: &[Subject], options: Options, monitor: &mut dyn Monitor) -> Result<Found, ReportError> {
     let mut memory = Table::new("groups-memory", "Grouped uniform grid: figure 5, memory", MEMORY).with_note(
         "The aligned tree is the kd-tree before its upper nodes are removed. Its g groups save 8 (g - 1) bytes of nodes and cost 24 g bytes of bounds: \
          always three times the saving and 24 bytes, also in the paper's own rows.",
@@ -124,7 +124,7 @@ pub(super) fn measure(
         let subject = case.source.subject()?;
         monitor.begin(&format!("groups: {}", subject.name))?;
         let kd = KdTree::build(&subject.prims(), &KdConfig::default())?;
-        let rays = picture(&subject, &kd, options);
+        let rays = picture(&kd, options);
         let mut scene = SceneReads { triangles: subject.indices.len(), scene: subject.name.clone(), reads: Vec::new() };
         scene.reads.push(count("kdtree", &kd, &subject.prims(), &rays));
         for settings in resolutions {
@@ -153,7 +153,7 @@ fn config(settings: &str) -> Result<GrugConfig, ReportError> {
     Ok(config)
 }
 
-fn picture(_subject: &Subject, kd: &KdTree, options: &Options) -> Vec<Ray> {
+fn picture(kd: &KdTree, options: Options) -> Vec<Ray> {
     let size = if options.quick { [480, 270] } else { [1920, 1080] };
     Sphere::around(kd.bounds()).map_or_else(Vec::new, |sphere| rays::primary(sphere, size))
 }
@@ -193,6 +193,7 @@ fn memory_row(case: &Case<'_>, subject: &Subject, kd: &KdTree, grug: &Grug) -> V
         subject.name.clone().into(),
         case.standing(triangles).into(),
         triangles.into(),
+        row.map(|row| row.polygons).into(),
         u64::from(grug.resolution()).into(),
         grug.groups().into(),
         mib(kd.stats().node_bytes),
@@ -252,7 +253,7 @@ fn plot(scenes: &[SceneReads]) -> Vec<Plot> {
 }
 
 fn checks(broken: usize, scenes: &[SceneReads]) -> Vec<Check> {
-    let tiny = scenes.iter().filter(|s| s.triangles < 1000).map(SceneReads::best).fold(None, least);
+    let tiny = scenes.iter().filter(|s| s.triangles < 1000).map(SceneReads::best).reduce(f64::min);
     let large = || scenes.iter().filter(|s| s.triangles > LARGE).map(SceneReads::best);
     vec![
         Check::new(
@@ -261,17 +262,13 @@ fn checks(broken: usize, scenes: &[SceneReads]) -> Vec<Check> {
             broken as f64,
         ),
         Check::new("groups: share of reads saved on the smallest scene", Bound::AtMost(0.0), tiny),
-        Check::new("groups: least share saved above 100,000 triangles", Bound::AtLeast(0.0), large().fold(None, least)),
+        Check::new("groups: least share saved above 100,000 triangles", Bound::AtLeast(0.0), large().reduce(f64::min)),
         Check::new(
             "groups: greatest share saved above 100,000 triangles",
             Bound::Between(0.5, 1.0),
-            large().fold(None, |a: Option<f64>, b| Some(a.map_or(b, |a| a.max(b)))),
+            large().reduce(f64::max),
         ),
     ]
-}
-
-fn least(a: Option<f64>, b: f64) -> Option<f64> {
-    Some(a.map_or(b, |a| a.min(b)))
 }
 
 #[cfg(test)]

@@ -68,7 +68,7 @@ struct Point {
 ///
 /// # Errors
 /// When `monitor` ends it or a scene or structure cannot be made.
-pub(super) fn table(options: &Options, monitor: &mut dyn Monitor) -> Result<(Table, Vec<Check>), ReportError> {
+pub(super) fn table(options: Options, monitor: &mut dyn Monitor) -> Result<(Table, Vec<Check>), ReportError> {
     let mut table = Table::new("lists", "Sorted lists: table 1", TABLE).with_note(
         "Spheres, cones and polygons as they are. The paper's lists are flat; its set of rays is not known, and its minimum is the hits a ray. The \
          fewest tests are the boxes that a ray enters before it ends, which is what boxes alone allow: lists reach it for rays that look for the \
@@ -136,7 +136,7 @@ fn cells(row: &ListScene, over: &OverBoxes, set: &str, structure: Structure, run
 /// # Errors
 /// When `monitor` ends it or a scene or structure cannot be made.
 pub(super) fn growth(
-    options: &Options,
+    options: Options,
     monitor: &mut dyn Monitor,
 ) -> Result<(Table, Vec<Plot>, Vec<Check>), ReportError> {
     let mut table = Table::new("lists-growth", "Sorted lists: growth (figures 3 to 10)", GROWTH).with_note(

@@ -30,7 +30,7 @@ pub struct Options {
 
 impl Options {
     /// Repeats of a time.
-    fn repeats(&self) -> usize {
+    fn repeats(self) -> usize {
         if self.quick { 1 } else { 3 }
     }
 }
@@ -40,11 +40,7 @@ impl Options {
 ///
 /// # Errors
 /// When `monitor` ends it, or a scene or structure cannot be made.
-pub fn report(
-    models: &[Subject],
-    options: &Options,
-    monitor: &mut (dyn Monitor + Send),
-) -> Result<Report, ReportError> {
+pub fn report(models: &[Subject], options: Options, monitor: &mut (dyn Monitor + Send)) -> Result<Report, ReportError> {
     let settings = Settings {
         quick: options.quick,
         threads: rayon::current_num_threads(),

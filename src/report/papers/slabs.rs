@@ -35,6 +35,7 @@ const COLUMNS: &[Column] = &[
     Column::new("scene", "scene", Role::Id, 0),
     Column::new("standing", "model or stand-in", Role::Note, 0),
     Column::new("triangles", "triangles", Role::Note, 0),
+    Column::new("paper_triangles", "(paper)", Role::Note, 0),
     Column::new("setup", "set-up", Role::Id, 0),
     Column::new("structure", "structure", Role::Id, 0),
     Column::new("nodes_per_ray", "N_T", Role::Less, 2),
@@ -105,7 +106,7 @@ fn cases<'a>(models: &'a [Subject], quick: bool) -> Vec<Case<'a>> {
 /// When `monitor` ends it or a structure cannot be built.
 pub(super) fn measure(
     models: &[Subject],
-    options: &Options,
+    options: Options,
     monitor: &mut dyn Monitor,
 ) -> Result<(Table, Vec<Check>), ReportError> {
     let mut table = Table::new("slabs", "Single slab hierarchy: table 1", COLUMNS).with_note(
@@ -128,7 +129,7 @@ pub(super) fn measure(
 }
 
 /// The rays of the paper's picture.
-fn picture(subject: &Subject, options: &Options) -> Result<Vec<Ray>, ReportError> {
+fn picture(subject: &Subject, options: Options) -> Result<Vec<Ray>, ReportError> {
     let list: AccelSpec = AccelSpec::new(crate::accel::AccelKind::List);
     let bounds = list.build(&subject.prims())?.bounds();
     let size = if options.quick { [160, 120] } else { [640, 480] };
@@ -159,7 +160,7 @@ impl Half {
 }
 
 impl Pair {
-    fn measure(subject: &Subject, setup: &Setup, rays: &[Ray], options: &Options) -> Result<Self, ReportError> {
+    fn measure(subject: &Subject, setup: &Setup, rays: &[Ray], options: Options) -> Result<Self, ReportError> {
         let (mut bvh2, box_tree) = Half::build(subject, "bvh2", setup, options.quick)?;
         let (mut ssh, slab_tree) = Half::build(subject, "ssh", setup, options.quick)?;
         let caster = |accel| Caster { accel, prims: subject.prims(), simd: options.simd };
@@ -188,6 +189,7 @@ impl Pair {
                 self.scene.clone().into(),
                 case.standing(triangles).into(),
                 triangles.into(),
+                published.map(|row| row.triangles).into(),
                 setup.name.into(),
                 half.spec.kind().name().into(),
                 c.per_ray(c.nodes).into(),
