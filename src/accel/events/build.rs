@@ -134,7 +134,7 @@ impl Builder<'_> {
         let least = bounds.extent().as_dvec3() * self.config.large;
         let extents = |item: &Item| (0..3).filter(|&i| f64::from(item.aabb.extent()[i]) > least[i]).count();
         let most = items.iter().map(extents).max().unwrap_or(0);
-        let is_large = |item: &Item| extents(item) >= most.min(2).max(1);
+        let is_large = |item: &Item| extents(item) >= most.clamp(1, 2);
         let large = items.iter().filter(|item| is_large(item)).count();
         let (mut front, mut back) = (0, large);
         for item in items.iter() {

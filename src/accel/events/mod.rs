@@ -6,8 +6,8 @@
 //! event, and tests an object when it has entered its box on every axis.
 //!
 //! Departures:
-//! - Integer ranks and cursors in place of status marks (see [`walk`](self)): a mark goes stale when an object is left on one axis
-//!   before it is entered on another, and a ray that turns back would then miss it.
+//! - Integer ranks and cursors in place of status marks: a mark goes stale when an object is left on one axis before it is
+//!   entered on another, and a ray that turns back would then miss it.
 //! - Arrays of events in place of linked lists.
 //! - A volume is closed when its exit lies behind, with a margin for rounding, and not by its exit event; whether a box is held
 //!   is decided with the same margin, so that the order of events whose times differ by rounding does not matter.

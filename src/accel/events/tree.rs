@@ -222,12 +222,11 @@ impl TreeWalk<'_> {
         count.node();
         let Volume { aabb, .. } = self.tree.volumes[volume as usize];
         let view = self.tree.view(&self.tree.volumes[volume as usize]);
-        let local = match at {
-            Some((axis, now)) => ListWalk::enter(&view, aabb, &self.ray, axis, now, count),
-            None => {
-                let hint = self.hints.iter().find(|seat| seat.volume == volume).map(|seat| seat.cursors);
-                ListWalk::start(&view, aabb, &self.ray, hint, count)
-            }
+        let local = if let Some((axis, now)) = at {
+            ListWalk::enter(&view, aabb, &self.ray, axis, now, count)
+        } else {
+            let hint = self.hints.iter().find(|seat| seat.volume == volume).map(|seat| seat.cursors);
+            ListWalk::start(&view, aabb, &self.ray, hint, count)
         };
         let t = local.t();
         if t > local.end() {

@@ -182,9 +182,9 @@ impl<W: RankWord> ListWalk<W> {
         count: &mut C,
     ) -> Self {
         let mut cursors = [0; 3];
-        for i in 0..3 {
+        for (i, at) in cursors.iter_mut().enumerate() {
             let list = view.list(i);
-            cursors[i] = if i == axis {
+            *at = if i == axis {
                 if ray.runs_back(i) { cursor(finite(list)) } else { 0 }
             } else if ray.moves(i) {
                 skip(list, ray, i, now, count)
@@ -207,9 +207,9 @@ impl<W: RankWord> ListWalk<W> {
     ) -> Self {
         let mut cursors = seat_point(view, ray.origin, hint, count);
         if ray.t_near > 0.0 {
-            for axis in 0..3 {
+            for (axis, at) in cursors.iter_mut().enumerate() {
                 if ray.moves(axis) {
-                    cursors[axis] = skip(view.list(axis), ray, axis, ray.t_near, count);
+                    *at = skip(view.list(axis), ray, axis, ray.t_near, count);
                 }
             }
         }
@@ -230,10 +230,10 @@ impl<W: RankWord> ListWalk<W> {
             start,
             scan: Scan::default(),
         };
-        for axis in 0..3 {
+        for (axis, at) in cursors.into_iter().enumerate() {
             if ray.moves(axis) {
                 let back = ray.runs_back(axis);
-                let next = cursors[axis].wrapping_sub(u32::from(back));
+                let next = at.wrapping_sub(u32::from(back));
                 walk.next[axis] = next;
                 walk.due[axis] = view.due(ray, axis, next);
                 walk.later[axis] = view.due(ray, axis, after(next, back));
