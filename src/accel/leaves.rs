@@ -161,6 +161,7 @@ pub(super) fn append_leaf(items: &mut Vec<u32>, objects: impl Iterator<Item = u3
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Line {
     pub(super) origin: [f64; 3],
+    pub(super) dir: [f64; 3],
     pub(super) inv: [f64; 3],
     pub(super) t_near: f64,
 }
@@ -174,9 +175,11 @@ pub(super) const NARROW: f64 = 2.0 - WIDEN;
 impl Line {
     #[inline(always)]
     pub(super) fn new(range: &RayRange) -> Self {
+        let dir = range.dir.to_array().map(f64::from);
         Self {
             origin: range.origin.to_array().map(f64::from),
-            inv: range.dir.to_array().map(|d| 1.0 / f64::from(d)),
+            dir,
+            inv: dir.map(|d| 1.0 / d),
             t_near: f64::from(range.t_near),
         }
     }

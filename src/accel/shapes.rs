@@ -75,7 +75,7 @@ fn clip_triangle(corners: [Vec3; 3], own: Aabb, to: Aabb) -> Aabb {
         return both;
     }
     let pad = f64::from(own.min.abs().max(own.max.abs()).max_element()) * f64::from_bits((1023 - 44) << 52);
-    let mut polygon: Polygon = corners.iter().map(|c| c.as_dvec3()).collect();
+    let mut polygon: Polygon = corners.into_iter().map(Vec3::as_dvec3).collect();
     for axis in 0..3 {
         if own.min[axis] < to.min[axis] {
             polygon = cut(&polygon, axis, f64::from(to.min[axis]) - pad, 1.0);
@@ -128,7 +128,7 @@ const SLACK: f64 = 1e-12;
 
 /// True only when the triangle's plane surely passes by the box.
 fn plane_misses(corners: [Vec3; 3], center: DVec3, half: DVec3) -> bool {
-    let [a, b, c] = corners.map(|c| c.as_dvec3());
+    let [a, b, c] = corners.map(Vec3::as_dvec3);
     let (e1, e2, s) = (b - a, c - a, center - a);
     let normal = e1.cross(e2);
     let reach = normal.abs().dot(half);
@@ -158,7 +158,7 @@ mod tests {
             let own = Aabb::from_points(corners);
             let clipped = clip_triangle(corners, own, to);
             prop_assert!(own.contains(clipped) && to.contains(clipped));
-            let [a, b, c] = corners.map(|c| c.as_dvec3());
+            let [a, b, c] = corners.map(Vec3::as_dvec3);
             for (u, v) in weights {
                 let (u, v) = if u + v > 1.0 { (1.0 - u, 1.0 - v) } else { (u, v) };
                 let x = a + (b - a) * u + (c - a) * v;

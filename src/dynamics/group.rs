@@ -139,7 +139,9 @@ impl Group {
         } else {
             self.refit(&base, spec)?
         };
-        self.accel_pool.keep(base);
+        if base.refits() {
+            self.accel_pool.keep(base);
+        }
         Ok(Work { swaps: 1, ..work })
     }
 

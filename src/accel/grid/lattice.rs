@@ -151,7 +151,11 @@ impl Lattice {
 #[derive(Clone, Copy, Debug)]
 pub(in crate::accel) struct Dda {
     pub(in crate::accel) cell: [u32; 3],
-    /// When the ray leaves the cell on each axis; infinite when it leaves the lattice there, or never.
+    /// Planes that are still to be crossed before the last cell; 0 where the ray crosses none.
+    left: [u32; 3],
+    /// Numbers of the next planes.
+    plane: [f64; 3],
+    /// When the next planes are crossed; infinite at the last cell.
     next: [f64; 3],
 }
 
@@ -159,53 +163,57 @@ impl Dda {
     /// The walk from `t` on.
     #[inline(always)]
     pub(in crate::accel) fn new(lattice: &Lattice, line: &Line, t: f64) -> Self {
-        let mut out = Self { cell: [0; 3], next: [f64::INFINITY; 3] };
+        let mut out = Self { cell: [0; 3], left: [0; 3], plane: [0.0; 3], next: [f64::INFINITY; 3] };
         for axis in 0..3 {
-            // Infinite directions do not occur: 0 where `inv` is infinite.
-            let travelled = if line.inv[axis].is_infinite() { 0.0 } else { t / line.inv[axis] };
-            out.cell[axis] = lattice.cell(axis, line.origin[axis] + travelled);
-            out.next[axis] = out.leaving(lattice, line, axis);
+            out.cell[axis] = lattice.cell(axis, line.origin[axis] + t * line.dir[axis]);
+            out.seat(lattice, line, axis);
         }
         out
     }
 
-    /// When the ray leaves the cell on an axis.
+    /// Derives all but the cell on an axis.
     #[inline(always)]
-    pub(in crate::accel) fn leaving(&self, lattice: &Lattice, line: &Line, axis: usize) -> f64 {
-        let (cell, inv) = (self.cell[axis], line.inv[axis]);
-        let (plane, last) = if inv < 0.0 { (cell, 0) } else { (cell + 1, lattice.cells[axis]) };
-        if plane == last || inv.is_infinite() { f64::INFINITY } else { line.t(axis, lattice.plane(axis, plane)) }
+    fn seat(&mut self, lattice: &Lattice, line: &Line, axis: usize) {
+        let cell = self.cell[axis];
+        let (plane, left) =
+            if line.inv[axis] < 0.0 { (cell, cell) } else { (cell + 1, lattice.cells[axis] - 1 - cell) };
+        self.left[axis] = if line.inv[axis].is_infinite() { 0 } else { left };
+        self.plane[axis] = f64::from(plane);
+        self.set_next(lattice, line, axis);
     }
 
-    /// The axis of the first crossing to come, and when it is; infinite at the end of the lattice.
+    #[inline(always)]
+    fn set_next(&mut self, lattice: &Lattice, line: &Line, axis: usize) {
+        let t = line.t(axis, lattice.low[axis] + self.plane[axis] * lattice.width[axis]);
+        self.next[axis] = if self.left[axis] == 0 { f64::INFINITY } else { t };
+    }
+
+    /// The axis of the first crossing to come, and when it is; infinite at the end of the lattice. No branches: which axis comes next is
+    /// hard to predict.
     #[inline(always)]
     pub(in crate::accel) fn crossing(&self) -> (usize, f64) {
         let [x, y, z] = self.next;
-        if x <= y {
-            if x <= z { (0, x) } else { (2, z) }
-        } else if y <= z {
-            (1, y)
-        } else {
-            (2, z)
-        }
+        let axis = usize::from(y < x);
+        let first = if y < x { y } else { x };
+        let axis = if z < first { 2 } else { axis };
+        (axis, if z < first { z } else { first })
     }
 
     /// Crosses the plane of an axis whose crossing is finite.
     #[inline(always)]
     pub(in crate::accel) fn cross(&mut self, lattice: &Lattice, line: &Line, axis: usize) {
-        if line.inv[axis] < 0.0 {
-            self.cell[axis] -= 1;
-        } else {
-            self.cell[axis] += 1;
-        }
-        self.next[axis] = self.leaving(lattice, line, axis);
+        let backward = line.inv[axis] < 0.0;
+        self.cell[axis] = self.cell[axis].wrapping_add(if backward { u32::MAX } else { 1 });
+        self.plane[axis] += if backward { -1.0 } else { 1.0 };
+        self.left[axis] -= 1;
+        self.set_next(lattice, line, axis);
     }
 
     /// Goes straight to the state after all crossings before (`t`, `axis`) and that one itself; the cell on `axis` is given.
     #[inline(always)]
     pub(in crate::accel) fn jump(&mut self, lattice: &Lattice, line: &Line, axis: usize, cell: u32, t: f64) {
         self.cell[axis] = cell;
-        self.next[axis] = self.leaving(lattice, line, axis);
+        self.seat(lattice, line, axis);
         for other in (0..3).filter(|&other| other != axis) {
             // A crossing at the same t comes before this one on a lower axis.
             let is_due = |crossing: f64| crossing < t || (crossing <= t && other < axis);
@@ -213,14 +221,14 @@ impl Dda {
                 continue;
             }
             let backward = line.inv[other] < 0.0;
-            let guess = lattice.cell(other, line.origin[other] + t / line.inv[other]);
+            let guess = lattice.cell(other, line.origin[other] + t * line.dir[other]);
             let near = self.cell[other];
             self.cell[other] = if backward { guess.min(near) } else { guess.max(near) };
             // The guess may be a cell off either way.
             while self.cell[other] != near && !is_due(self.entered(lattice, line, other)) {
                 self.cell[other] = if backward { self.cell[other] + 1 } else { self.cell[other] - 1 };
             }
-            self.next[other] = self.leaving(lattice, line, other);
+            self.seat(lattice, line, other);
             while is_due(self.next[other]) {
                 self.cross(lattice, line, other);
             }

@@ -107,7 +107,12 @@ struct Cells {
     lattice: Lattice,
     /// The first unit of every cell, x fastest, then the number of units.
     starts: Vec<u32>,
+    /// A bit for every cell that owns something: most cells are empty, and this stays in the cache.
+    full: Vec<u64>,
 }
+
+/// Address that reads of `full` are counted from; `starts` are counted from 0.
+const FULL: usize = usize::MAX / 2 + 1;
 
 impl Cells {
     fn build(
@@ -116,7 +121,19 @@ impl Cells {
         unit: Unit,
     ) -> Result<(Self, Vec<u32>), BuildError> {
         let Contents { bounds, lattice, starts, items } = fill(Grid::NAME, shapes, resolution, unit)?;
-        Ok((Self { bounds, lattice, starts }, items))
+        let mut full = vec![0; starts.len().div_ceil(64)];
+        for (cell, places) in starts.windows(2).enumerate() {
+            full[cell / 64] |= u64::from(places[0] < places[1]) << (cell % 64);
+        }
+        Ok((Self { bounds, lattice, starts, full }, items))
+    }
+
+    /// What a step along each axis adds to a cell's number, modulo the range of numbers.
+    #[inline(always)]
+    fn strides(&self, line: &Line) -> [usize; 3] {
+        let [nx, ny, _] = self.lattice.cells.map(|n| n as usize);
+        let strides = [1, nx, nx * ny];
+        std::array::from_fn(|i| if line.inv[i] < 0.0 { strides[i].wrapping_neg() } else { strides[i] })
     }
 
     #[inline(always)]
@@ -132,19 +149,25 @@ impl Cells {
             return self.walk_far(&line, interval, leaves, count);
         }
         let mut dda = Dda::new(&self.lattice, &line, interval.0);
+        let (mut cell, strides) = (number(&self.lattice, dda.cell), self.strides(&line));
+        let mut t_end = interval.1;
         loop {
             count.step();
-            let cell = number(&self.lattice, dda.cell);
-            count.read(cell * 4, 8);
-            let units = self.units(cell);
-            if !units.is_empty() && leaves.leaf(units, count) {
-                return true;
+            count.read(FULL + cell / 64 * 8, 8);
+            if (self.full[cell / 64] >> (cell % 64)) & 1 == 1 {
+                count.read(cell * 4, 8);
+                if leaves.leaf(self.units(cell), count) {
+                    return true;
+                }
+                let limit = leaves.t_limit();
+                t_end = if limit < t_end { limit } else { t_end };
             }
             let (axis, t) = dda.crossing();
-            if t > interval.1 || t > leaves.t_limit() {
+            if t > t_end {
                 return false;
             }
             dda.cross(&self.lattice, &line, axis);
+            cell = cell.wrapping_add(strides[axis]);
         }
     }
 
@@ -171,7 +194,7 @@ impl Cells {
             nodes: self.starts.len() - 1,
             leaves: full,
             depth: 1,
-            node_bytes: size_of_val(&self.starts[..]),
+            node_bytes: size_of_val(&self.starts[..]) + size_of_val(&self.full[..]),
             total_bytes: 0,
             sah_cost: 0.0,
         }

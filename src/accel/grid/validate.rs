@@ -18,6 +18,10 @@ pub(super) fn validate(grid: &Grid, prims: &Triangles<'_>) -> Result<(), String>
     if starts.len() != total + 1 || starts[0] != 0 || starts[total] as usize != units || !starts.is_sorted() {
         return Err("the cells do not share out what there is".into());
     }
+    let full = |cell: usize| grid.cells.full[cell / 64] >> (cell % 64) & 1 == 1;
+    if (0..total).any(|cell| full(cell) == grid.cells.units(cell).is_empty()) {
+        return Err("a full cell is marked as empty, or an empty one as full".into());
+    }
     if let Owned::Blocks(blocks) = &grid.owned {
         for block in blocks {
             for (lane, prim) in block.prims().enumerate() {

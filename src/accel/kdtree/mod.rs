@@ -52,7 +52,7 @@ pub struct KdConfig {
 
 impl Default for KdConfig {
     fn default() -> Self {
-        Self { bins: 64, block_cost: 6.0, empty_bonus: 0.2, clip: true }
+        Self { bins: 64, block_cost: 8.0, empty_bonus: 0.1, clip: true }
     }
 }
 

@@ -64,9 +64,9 @@ impl Plan {
         let mut search = Search { cell, area, count: refs.len(), costs: &params.costs, best: None };
         search.faces(refs);
         if refs.len() <= SWEEP {
-            search.sweep(refs)
+            search.sweep(refs);
         } else {
-            search.binned(refs, params.bins)
+            search.binned(refs, params.bins);
         }
         search.best.filter(|plan| plan.cost < params.costs.leaf(refs.len()))
     }
