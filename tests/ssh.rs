@@ -251,6 +251,6 @@ fn rays_beside_the_root_box_visit_nothing() {
     let beside = [Ray::new(Vec3::new(3.0, 3.0, 3.0), Vec3::X), Ray::new(Vec3::new(0.0, 0.0, 2.0), Vec3::Z)];
     let accel = build("ssh", &mesh.prims());
     let counts = dispatch(SimdLevel::best(), Count { accel: &accel, prims: mesh.prims(), rays: &beside });
-    assert_eq!(counts, [0.0, 0.0]);
+    assert!(counts.iter().all(|&n| n < 1e-9), "{counts:?}");
     assert_eq!(accel.kind(), AccelKind::Ssh);
 }
