@@ -10,8 +10,11 @@
 //! as there; with one triangle a leaf, four leaves share a block. Pairs and blocks stand in depth-first order: a subtree owns a contiguous run of
 //! each, and subtrees are refitted in parallel without sharing.
 //!
-//! Cost: build O(n log n), refit O(n) on the current rayon pool. A ray visits about twice the nodes of `bvh2`, each at a sixth of the cost. Choose it
-//! where node memory counts, and for packets of rays.
+//! Before the exact test of a leaf's triangles their own boxes are tested, taken from the corners in the block: planes alone lead rays to three times
+//! the leaves.
+//!
+//! Cost: build O(n log n), refit O(n) on the current rayon pool. A ray visits two to three times the nodes of `bvh2` and takes 1.1 to 2.3 times as long
+//! (`benches/records/2026-11-22-ssh.md`). Choose it where the memory of nodes counts.
 
 mod build;
 mod choose;
