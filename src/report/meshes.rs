@@ -60,6 +60,31 @@ pub fn soup(triangles: usize) -> Subject {
     Subject::still(format!("soup-{}", short(count)), positions, indices)
 }
 
+/// The corners of a box's faces: corner `c` is at the upper end of axis `i` when bit `i` is set.
+const FACES: [[u32; 4]; 6] = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
+
+/// So many upright boxes of twelve triangles on a floor, which is one of them: a room as made by hand.
+pub fn boxes(count: usize) -> Subject {
+    let count = count.clamp(1, MAX_TRIANGLES / 12);
+    let corners = |i: usize| {
+        let mut random = Random::new(0xb0c5, i as u64);
+        let mut number = |low: f64, high: f64| low + (high - low) * random.unit();
+        let half = DVec3::new(number(0.02, 0.08), number(0.02, 0.3), number(0.02, 0.08));
+        let (center, half) = match i {
+            0 => (DVec3::new(0.0, -0.05, 0.0), DVec3::new(1.0, 0.05, 1.0)),
+            _ => (DVec3::new(number(-0.9, 0.9), half.y, number(-0.9, 0.9)), half),
+        };
+        let side = |bit: usize, c: usize| if c >> bit & 1 == 1 { 1.0 } else { -1.0 };
+        (0..8).map(move |c| (center + half * DVec3::new(side(0, c), side(1, c), side(2, c))).as_vec3())
+    };
+    let faces = |i: u32| {
+        let halves = |f: [u32; 4]| [[f[0], f[1], f[2]], [f[0], f[2], f[3]]];
+        FACES.into_iter().flat_map(halves).map(move |t| t.map(|c| 8 * i + c))
+    };
+    let positions = (0..count).flat_map(corners).collect();
+    Subject::still(format!("boxes-{count}"), positions, (0..count as u32).flat_map(faces).collect())
+}
+
 /// The vertices moved by a standing wave of a thousandth of their box's diagonal.
 pub(super) fn waved(positions: &[Vec3]) -> Vec<Vec3> {
     let bounds = Aabb::from_points(positions.iter().copied().filter(|p| p.is_finite()));
@@ -103,5 +128,6 @@ mod tests {
         assert_eq!(dented_sphere(1000).name, "sphere-968");
         assert_eq!(soup(10_000).name, "soup-10k");
         assert_eq!(soup(0).indices.len(), 1);
+        assert_eq!((boxes(41).indices.len(), boxes(41).positions.len()), (492, 328));
     }
 }

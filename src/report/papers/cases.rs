@@ -14,6 +14,8 @@ pub(super) enum Source<'a> {
     Sphere(usize),
     /// So many triangles without order.
     Soup(usize),
+    /// So many boxes of twelve triangles.
+    Boxes(usize),
     /// A database at a size factor, in at most so many triangles.
     Spd(SpdKind, u32, usize),
 }
@@ -39,6 +41,7 @@ impl Source<'_> {
             Self::Given(subject) => subject.clone(),
             Self::Sphere(triangles) => meshes::dented_sphere(triangles),
             Self::Soup(triangles) => meshes::soup(triangles),
+            Self::Boxes(count) => meshes::boxes(count),
             Self::Spd(kind, size, triangles) => {
                 let name = format!("spd-{}:{size}", kind.name());
                 let scene = kind

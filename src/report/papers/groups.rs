@@ -86,6 +86,7 @@ struct SceneReads {
 
 fn cases(models: &[Subject], quick: bool) -> Vec<Case<'_>> {
     let stand_in = |row: &GroupScene| match row.scene {
+        "UlmBox" => Source::Boxes(row.polygons / 12),
         "FairyForest" => Source::Spd(SpdKind::Tree, 9, row.polygons),
         "Cabin" => Source::Spd(SpdKind::Gears, 6, row.polygons),
         "Atrium" => Source::Spd(SpdKind::Lattice, 12, row.polygons),

@@ -54,6 +54,10 @@ const COLUMNS: &[Column] = &[
     Column::new("paper_mebibytes", "(paper)", Role::Note, 2),
 ];
 
+/// The paper's scanned models. Stand-ins for its other scenes are of another sort, so the bounds on nodes and triangles a ray do not apply
+/// to them; their rows show what they do.
+const SCANNED: [&str; 3] = ["HappyBuddha", "Dragon", "Bunny"];
+
 /// One structure in one set-up.
 struct Half {
     spec: AccelSpec,
@@ -68,6 +72,8 @@ struct Half {
 struct Pair {
     scene: String,
     reproduces: bool,
+    /// A scanned model or a surface like one, in the paper's table.
+    scanned: bool,
     bvh2: Half,
     ssh: Half,
     differences: usize,
@@ -112,7 +118,8 @@ pub(super) fn measure(
     let mut table = Table::new("slabs", "Single slab hierarchy: table 1", COLUMNS).with_note(
         "First hits of 640 x 480 rays (quick: 160 x 120), one thread. N_T counts nodes tested a ray and N_I triangles tested a ray, of single rays; \
          packets hold 16 rays, the paper's 4. T_R is the casting alone, the paper's the whole picture on a processor of 2007: compare ratios. \
-         Speed-up is T_R of `bvh2` over that of `ssh`. Stand-ins replace models that are not at hand.",
+         Speed-up is T_R of `bvh2` over that of `ssh`. Stand-ins replace models that are not at hand; bounds \
+         on N_T and N_I are of scanned surfaces, to which those for PowerPlant, FairyFrame1 and Toys do not belong.",
     );
     let mut pairs = Vec::new();
     for case in cases(models, options.quick) {
@@ -120,7 +127,8 @@ pub(super) fn measure(
         let rays = picture(&subject, options)?;
         for setup in &SETUPS {
             monitor.begin(&format!("slabs: {}: {}", subject.name, setup.name))?;
-            let pair = Pair::measure(&subject, setup, &rays, options)?;
+            let mut pair = Pair::measure(&subject, setup, &rays, options)?;
+            pair.scanned = case.model.is_some_and(|m| SCANNED.contains(&m));
             pair.rows(&case, setup, subject.indices.len(), &mut table);
             pairs.push(pair);
         }
@@ -176,7 +184,8 @@ impl Pair {
             ssh.cast(&slabs, rays, &mut found);
             differences += differing(&due, &found);
         }
-        Ok(Self { scene: subject.name.clone(), reproduces: setup.reproduces, bvh2, ssh, differences })
+        let (scene, reproduces) = (subject.name.clone(), setup.reproduces);
+        Ok(Self { scene, reproduces, scanned: false, bvh2, ssh, differences })
     }
 
     fn rows(&self, case: &Case<'_>, setup: &Setup, triangles: usize, table: &mut Table) {
@@ -234,6 +243,9 @@ fn checks(pairs: &[Pair]) -> Vec<Check> {
             Bound::Exactly(0.25),
             memory(pair),
         ));
+        if !pair.scanned {
+            continue;
+        }
         checks.push(Check::new(
             format!("slabs: {scene}: nodes a ray in the paper's set-up, ssh over bvh2"),
             Bound::Between(1.5, 2.3),
@@ -280,6 +292,7 @@ mod tests {
         Pair {
             scene: "s".into(),
             reproduces: true,
+            scanned: true,
             bvh2: half(AccelKind::Bvh2, 88, 6, 3200, 0.66),
             ssh: half(AccelKind::Ssh, 180, 13, 800, 0.65),
             differences: 0,

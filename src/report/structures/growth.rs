@@ -82,18 +82,24 @@ fn fill(row: &mut GrowthRow, subject: &Subject, spec: &AccelSpec, questions: &[Q
     row.violations.extend(accel.validate(&prims).err().map(|v| format!("broken after the build: {}", v.0)));
     row.differences = Some(0);
     for questions in questions {
-        cast(row, &accel, subject, questions, options);
+        cast(row, (spec, &accel), subject, questions, options);
     }
     if !refit(accel, subject, repeats, &mut row.refit) {
         row.note = Some("rebuilds instead of refitting".to_owned());
     }
 }
 
-fn cast(row: &mut GrowthRow, accel: &AnyAccel, subject: &Subject, questions: &Questions, options: &Options) {
+fn cast(
+    row: &mut GrowthRow,
+    (spec, accel): (&AccelSpec, &AnyAccel),
+    subject: &Subject,
+    questions: &Questions,
+    options: &Options,
+) {
     let caster = Caster { accel, prims: subject.prims(), simd: options.simd };
     let is_primary = questions.class == RayClass::Primary;
     // Both classes take the same number of rays.
-    let n = row.count.unwrap_or_else(|| affordable(&caster, questions, options.budget()));
+    let n = row.count.unwrap_or_else(|| affordable(spec, &caster, questions, options.budget()));
     let (rays, due) = part(questions, n.min(questions.rays.len()));
     let mut found = due.clone();
     if is_primary {

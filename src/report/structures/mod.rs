@@ -33,7 +33,7 @@ pub struct Options {
 impl Options {
     /// All structures of [`specs`] at the best level.
     pub fn new(quick: bool) -> Self {
-        Self { quick, simd: SimdLevel::best(), specs: specs() }
+        Self { quick, simd: SimdLevel::best(), specs: specs(quick) }
     }
 
     /// Repeats of a time.
@@ -55,9 +55,9 @@ impl Options {
 /// Settings worth a row of their own, besides the defaults of every kind.
 const VARIANTS: [&str; 4] = ["ssh:leaf=1", "ssh:refit=rechoose", "events:form=flat", "grug:mode=dda"];
 
-/// Every structure with its default settings, and variants that show a trade.
-pub fn specs() -> Vec<AccelSpec> {
-    let variants = VARIANTS.iter().filter_map(|text| text.parse().ok());
+/// Every structure with its default settings and, unless `quick`, variants that show a trade.
+pub fn specs(quick: bool) -> Vec<AccelSpec> {
+    let variants = VARIANTS.iter().filter(|_| !quick).filter_map(|text| text.parse().ok());
     let mut specs: Vec<_> = AccelKind::ALL.iter().copied().map(AccelSpec::new).chain(variants).collect();
     specs.sort_by_key(|spec| AccelKind::ALL.iter().position(|&k| k == spec.kind()));
     specs
@@ -69,7 +69,8 @@ pub fn specs() -> Vec<AccelSpec> {
 /// When a built-in scene does not load.
 pub fn default_subjects(quick: bool) -> Result<Vec<Subject>, ReportError> {
     let mut subjects = Vec::new();
-    for name in builtin::names() {
+    let scenes = if quick { &builtin::names()[..2] } else { builtin::names() };
+    for name in scenes {
         subjects.push(Subject::from_scene(format!("builtin:{name}"), &builtin::load(name)?));
     }
     let triangles = if quick { 20_000 } else { 200_000 };
@@ -113,7 +114,7 @@ mod tests {
 
     #[test]
     fn every_kind_and_every_variant_is_measured_once() {
-        let specs = specs();
+        let specs = specs(false);
         assert_eq!(specs.len(), AccelKind::ALL.len() + VARIANTS.len());
         for (i, spec) in specs.iter().enumerate() {
             assert!(!specs[..i].contains(spec), "{spec}");

@@ -16,8 +16,10 @@ use crate::{
     simd::SimdLevel,
 };
 
-/// Builds take at most this long before they are no longer repeated, in seconds.
-const REPEAT_BELOW_S: f64 = 2.0;
+/// Builds that take longer are not repeated, in seconds.
+fn repeat_below(quick: bool) -> f64 {
+    if quick { 0.1 } else { 2.0 }
+}
 
 /// Triangles above which memory is watched before each build.
 const LARGE: usize = 500_000;
@@ -111,7 +113,7 @@ fn build_row(
         motion: subject.motion,
         ..BuildRow::default()
     };
-    let accel = match build(&prims, spec, options.repeats(), &mut row.build) {
+    let accel = match build(&prims, spec, options, &mut row.build) {
         Ok(accel) => accel,
         Err(reason) => {
             row.note = Some(reason);
@@ -127,14 +129,19 @@ fn build_row(
             row.decay = Some(refitted.decay());
             row.violations.extend(refitted.validate(&prims).err().map(|v| format!("broken after the refit: {}", v.0)));
             let caster = Caster { accel: &refitted, prims, simd: options.simd };
-            row.refit_differences = moved.map(|q| differences(&caster, q, options.budget()));
+            row.refit_differences = moved.map(|q| differences(spec, &caster, q, options.budget()));
         }
     }
     (row, Some(accel))
 }
 
 /// Builds as often as is quick; the reason in words when the structure refuses.
-fn build(prims: &Triangles<'_>, spec: &AccelSpec, repeats: usize, samples: &mut Samples) -> Result<AnyAccel, String> {
+fn build(
+    prims: &Triangles<'_>,
+    spec: &AccelSpec,
+    options: &Options,
+    samples: &mut Samples,
+) -> Result<AnyAccel, String> {
     if prims.len() > LARGE {
         // A part of the mesh tells what the whole will take.
         let part = Triangles { indices: &prims.indices[..LARGE / 8], ..*prims };
@@ -147,8 +154,8 @@ fn build(prims: &Triangles<'_>, spec: &AccelSpec, repeats: usize, samples: &mut 
         }
     }
     let mut accel = samples.time(|| spec.build(prims)).map_err(|e| e.to_string())?;
-    for _ in 1..repeats {
-        if samples.median().is_some_and(|s| s > REPEAT_BELOW_S) {
+    for _ in 1..options.repeats() {
+        if samples.median().is_some_and(|s| s > repeat_below(options.quick)) {
             break;
         }
         drop(accel);
@@ -176,18 +183,21 @@ fn refit(accel: &AnyAccel, subject: &Subject, repeats: usize, samples: &mut Samp
 }
 
 /// How many of the rays that the structure can answer within `budget` it answers otherwise.
-fn differences(caster: &Caster<'_>, questions: &Questions, budget: u64) -> usize {
-    let n = affordable(caster, questions, budget);
+fn differences(spec: &AccelSpec, caster: &Caster<'_>, questions: &Questions, budget: u64) -> usize {
+    let n = affordable(spec, caster, questions, budget);
     let (rays, due) = part(questions, n);
     let found = caster.answers(&rays, questions.class.ask());
     found.iter().zip(&due).filter(|(a, b)| a != b).count()
 }
 
-/// How many rays cost at most `budget`, by a sample of them.
-pub(super) fn affordable(caster: &Caster<'_>, questions: &Questions, budget: u64) -> usize {
+/// How many rays cost at most `budget`, by a sample of them. The flat form of `events` looks at every box when a ray begins, which no
+/// counter sees.
+pub(super) fn affordable(spec: &AccelSpec, caster: &Caster<'_>, questions: &Questions, budget: u64) -> usize {
     let sample = rays::spread(&questions.rays, 256);
+    let start = if spec.to_string().contains("form=flat") { caster.prims.len() as u64 } else { 0 };
     let counts = caster.count(&sample, questions.class.ask(), budget / 4);
-    let rays = u128::from(budget) * u128::from(counts.rays) / u128::from(counts.work().max(1));
+    let work = counts.work() + start * counts.rays;
+    let rays = u128::from(budget) * u128::from(counts.rays) / u128::from(work.max(1));
     usize::try_from(rays).unwrap_or(usize::MAX).clamp(16, questions.rays.len().max(16))
 }
 
@@ -218,7 +228,7 @@ fn ray_rows(
 ) -> Result<(), ReportError> {
     let class = questions.class;
     let turn = |b: &Built<'_>, caster: &Caster<'_>| {
-        let (rays, due) = part(questions, affordable(caster, questions, options.budget()));
+        let (rays, due) = part(questions, affordable(b.spec, caster, questions, options.budget()));
         let counts = caster.count(&rays, class.ask(), options.budget());
         let row = RayRow {
             scene: subject.name.clone(),
