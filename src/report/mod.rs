@@ -27,7 +27,7 @@ pub use error::ReportError;
 pub use machine::Machine;
 pub use monitor::{Monitor, Quiet};
 pub use plot::{Bars, Chart, Line, Lines, Plot};
-pub use rays::RayClass;
+pub use rays::{RayClass, View};
 pub use record::{Kind, Report, SCHEMA, Settings};
 pub use subject::Subject;
 pub use table::{Cell, Column, Role, Table};

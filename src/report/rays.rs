@@ -77,14 +77,33 @@ impl Sphere {
     }
 }
 
-/// Rays of a picture of `width` x `height` pixels, both rounded up to whole tiles: the shorter side just holds the scene.
-pub(super) fn primary(scene: Sphere, [width, height]: [usize; 2]) -> Vec<Ray> {
-    let back = BACK.normalize();
-    let right = DVec3::Y.cross(back).normalize();
+/// Where a picture is taken from.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct View {
+    /// Eye point.
+    pub eye: DVec3,
+    /// Point in the middle of the picture.
+    pub at: DVec3,
+    /// Upwards, roughly.
+    pub up: DVec3,
+    /// Half of the picture's shorter side at distance 1.
+    pub half: f64,
+}
+
+impl View {
+    /// Of the whole scene: its sphere at 2.5 radii, seen under its own angle.
+    pub(super) fn whole(scene: Sphere) -> Self {
+        let eye = scene.center + BACK.normalize() * (2.5 * scene.radius);
+        Self { eye, at: scene.center, up: DVec3::Y, half: 1.0 / (2.5_f64 * 2.5 - 1.0).sqrt() }
+    }
+}
+
+/// Rays of a picture of `width` x `height` pixels, both rounded up to whole tiles.
+pub(super) fn primary(view: View, [width, height]: [usize; 2]) -> Vec<Ray> {
+    let View { eye, at, up, half } = view;
+    let back = (eye - at).normalize();
+    let right = up.cross(back).normalize();
     let up = back.cross(right);
-    // The scene's sphere at 2.5 radii, seen under its own angle.
-    let eye = scene.center + back * (2.5 * scene.radius);
-    let half = 1.0 / (2.5_f64 * 2.5 - 1.0).sqrt();
     let pixel = 2.0 * half / width.min(height).max(1) as f64;
     let (columns, rows) = (width.div_ceil(TILE), height.div_ceil(TILE));
     let ray = |i: usize| {
@@ -165,7 +184,7 @@ mod tests {
     #[test]
     fn the_camera_sees_the_scene_and_packets_are_tiles() {
         let sphere = Sphere::around(BALL).unwrap();
-        let rays = primary(sphere, [64, 32]);
+        let rays = primary(View::whole(sphere), [64, 32]);
         assert_eq!(rays.len(), 64 * 32);
         let toward = |r: &Ray| r.dir.as_dvec3().normalize().dot(-BACK.normalize());
         let least = rays.iter().map(toward).fold(1.0, f64::min);
@@ -187,7 +206,7 @@ mod tests {
 
     #[test]
     fn a_part_of_the_rays_is_spread_over_all() {
-        let rays = primary(Sphere::around(BALL).unwrap(), [64, 64]);
+        let rays = primary(View::whole(Sphere::around(BALL).unwrap()), [64, 64]);
         let part = spread(&rays, 100);
         assert_eq!(part.len(), 112);
         assert_eq!(part[..16], rays[..16]);

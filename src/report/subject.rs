@@ -1,6 +1,6 @@
 use rayon::prelude::*;
 
-use super::meshes;
+use super::{View, meshes};
 use crate::{
     anim::{ActiveClip, Pose, deform},
     geom::Triangles,
@@ -24,13 +24,15 @@ pub struct Subject {
     pub indices: Vec<[u32; 3]>,
     /// What the motion is.
     pub motion: &'static str,
+    /// Where the papers' pictures are taken from; without it, the whole scene is seen.
+    pub view: Option<View>,
 }
 
 impl Subject {
     /// A mesh; its motion is a wave of a thousandth of its size.
     pub fn still(name: impl Into<String>, positions: Vec<Vec3>, indices: Vec<[u32; 3]>) -> Self {
         let moved = meshes::waved(&positions);
-        Self { name: name.into(), positions, moved, indices, motion: "wave" }
+        Self { name: name.into(), positions, moved, indices, motion: "wave", view: None }
     }
 
     /// The instances of a scene in the middle of its first clip, and a thirtieth of a second later. Without a clip, its rest pose, as
@@ -42,7 +44,7 @@ impl Subject {
             return Self::still(name, positions, indices);
         }
         let (moved, _) = posed(scene, clip, FRAME_S);
-        Self { name: name.into(), positions, moved, indices, motion: "clip, one frame" }
+        Self { name: name.into(), positions, moved, indices, motion: "clip, one frame", view: None }
     }
 
     /// The triangles before the motion.

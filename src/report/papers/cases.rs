@@ -1,8 +1,8 @@
 //! Which scene stands for which model of a paper.
 
 use crate::{
-    report::{ReportError, Subject, meshes},
-    scene::spd::SpdKind,
+    report::{ReportError, Subject, View, meshes},
+    scene::spd::{SpdKind, SpdView},
 };
 
 /// Where a scene comes from.
@@ -47,7 +47,15 @@ impl Source<'_> {
                 let scene = kind
                     .generate(size)
                     .map_err(|e| ReportError::Scene { scene: name.clone(), reason: e.to_string() })?;
-                Subject::from_scene(name, &scene.tessellate_within(triangles))
+                let mut subject = Subject::from_scene(name, &scene.tessellate_within(triangles));
+                let SpdView { from, at, up, angle_deg } = scene.view;
+                subject.view = Some(View {
+                    eye: scene.to_y_up(from),
+                    at: scene.to_y_up(at),
+                    up: scene.to_y_up(up),
+                    half: libm::tan(angle_deg.to_radians() / 2.0),
+                });
+                subject
             }
         })
     }

@@ -16,7 +16,7 @@ use crate::{
     geom::{Ray, Triangles},
     report::{
         Bars, Bound, Cell, Chart, Check, Column, Line, Monitor, Plot, ReportError, Role, Subject, Table,
-        rays::{self, Sphere},
+        rays::{self, Sphere, View},
     },
     scene::spd::SpdKind,
     simd::Scalar,
@@ -125,7 +125,7 @@ pub(super) fn measure(models: &[Subject], options: Options, monitor: &mut dyn Mo
         let subject = case.source.subject()?;
         monitor.begin(&format!("groups: {}", subject.name))?;
         let kd = KdTree::build(&subject.prims(), &KdConfig::default())?;
-        let rays = picture(&kd, options);
+        let rays = picture(&subject, &kd, options);
         let mut scene = SceneReads { triangles: subject.indices.len(), scene: subject.name.clone(), reads: Vec::new() };
         scene.reads.push(count("kdtree", &kd, &subject.prims(), &rays));
         for settings in resolutions {
@@ -154,9 +154,10 @@ fn config(settings: &str) -> Result<GrugConfig, ReportError> {
     Ok(config)
 }
 
-fn picture(kd: &KdTree, options: Options) -> Vec<Ray> {
+fn picture(subject: &Subject, kd: &KdTree, options: Options) -> Vec<Ray> {
     let size = if options.quick { [480, 270] } else { [1920, 1080] };
-    Sphere::around(kd.bounds()).map_or_else(Vec::new, |sphere| rays::primary(sphere, size))
+    let view = subject.view.or_else(|| Sphere::around(kd.bounds()).map(View::whole));
+    view.map_or_else(Vec::new, |view| rays::primary(view, size))
 }
 
 /// Counts every ray's reads, in the current rayon pool.

@@ -11,7 +11,7 @@ use crate::{
     report::{
         Bound, Cell, Check, Column, Monitor, ReportError, Role, Subject, Table,
         measure::{Answer, Ask, Caster, Counts, Samples},
-        rays::{self, Sphere},
+        rays::{self, Sphere, View},
     },
     scene::spd::SpdKind,
 };
@@ -141,7 +141,8 @@ fn picture(subject: &Subject, options: Options) -> Result<Vec<Ray>, ReportError>
     let list: AccelSpec = AccelSpec::new(crate::accel::AccelKind::List);
     let bounds = list.build(&subject.prims())?.bounds();
     let size = if options.quick { [160, 120] } else { [640, 480] };
-    Ok(Sphere::around(bounds).map_or_else(Vec::new, |sphere| rays::primary(sphere, size)))
+    let view = subject.view.or_else(|| Sphere::around(bounds).map(View::whole));
+    Ok(view.map_or_else(Vec::new, |view| rays::primary(view, size)))
 }
 
 impl Half {
@@ -191,7 +192,10 @@ impl Pair {
     fn rows(&self, case: &Case<'_>, setup: &Setup, triangles: usize, table: &mut Table) {
         let published = SLABS.iter().find(|row| case.model == Some(row.scene));
         for (i, half) in [&self.bvh2, &self.ssh].into_iter().enumerate() {
-            let paper = |value: fn(&SlabScene, usize) -> f64| Cell::from(published.map(|row| value(row, i)));
+            // The paper has one set-up.
+            let paper = |value: fn(&SlabScene, usize) -> f64| {
+                Cell::from(published.filter(|_| setup.reproduces).map(|row| value(row, i)))
+            };
             let c = &half.counts;
             table.push(vec![
                 case.model.into(),

@@ -11,7 +11,7 @@ use crate::{
     report::{
         Monitor, RayClass, ReportError, Subject,
         measure::{Answer, Caster, Samples},
-        rays::{self, Sphere},
+        rays::{self, Sphere, View},
     },
     simd::SimdLevel,
 };
@@ -45,7 +45,7 @@ pub(super) fn questions(
     let accel = AccelSpec::new(AccelKind::Bvh2).build(prims)?;
     let caster = Caster { accel: &accel, prims: *prims, simd };
     let Some(sphere) = Sphere::around(accel.bounds()) else { return Ok(Vec::new()) };
-    let primary = rays::primary(sphere, [side; 2]);
+    let primary = rays::primary(View::whole(sphere), [side; 2]);
     let hits = caster.answers(&primary, RayClass::Primary.ask());
     let ask = |&class: &RayClass| {
         let rays = match class {
