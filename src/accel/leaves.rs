@@ -5,6 +5,7 @@
 
 use std::ops::Range;
 
+use glam::Vec3;
 use rayon::prelude::*;
 
 use super::{
@@ -166,6 +167,12 @@ pub(super) struct Line {
     pub(super) t_near: f64,
 }
 
+/// In f64. Written out: `array::map` stays a call here.
+#[inline(always)]
+fn widened(v: Vec3) -> [f64; 3] {
+    [f64::from(v.x), f64::from(v.y), f64::from(v.z)]
+}
+
 /// Relative widening that covers the roundings of `(plane - origin) * inv`.
 pub(super) const WIDEN: f64 = 1.0 + 16.0 * f64::EPSILON;
 
@@ -175,11 +182,11 @@ pub(super) const NARROW: f64 = 2.0 - WIDEN;
 impl Line {
     #[inline(always)]
     pub(super) fn new(range: &RayRange) -> Self {
-        let dir = range.dir.to_array().map(f64::from);
+        let dir = widened(range.dir);
         Self {
-            origin: range.origin.to_array().map(f64::from),
+            origin: widened(range.origin),
             dir,
-            inv: dir.map(|d| 1.0 / d),
+            inv: [1.0 / dir[0], 1.0 / dir[1], 1.0 / dir[2]],
             t_near: f64::from(range.t_near),
         }
     }
@@ -211,6 +218,6 @@ impl Line {
         if aabb.is_empty() {
             return None;
         }
-        self.clip(aabb.min.to_array().map(f64::from), aabb.max.to_array().map(f64::from), t_far)
+        self.clip(widened(aabb.min), widened(aabb.max), t_far)
     }
 }

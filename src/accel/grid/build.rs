@@ -178,9 +178,8 @@ fn pairs(refs: &[Ref], shapes: &(impl Shapes + ?Sized), lattice: &Lattice) -> Ve
 /// Number of a cell, x fastest.
 #[inline(always)]
 pub(super) fn number(lattice: &Lattice, cell: [u32; 3]) -> usize {
-    let [nx, ny, _] = lattice.cells.map(|n| n as usize);
-    let [x, y, z] = cell.map(|c| c as usize);
-    (z * ny + y) * nx + x
+    let (nx, ny) = (lattice.cells[0] as usize, lattice.cells[1] as usize);
+    (cell[2] as usize * ny + cell[1] as usize) * nx + cell[0] as usize
 }
 
 /// Number of objects in every cell.

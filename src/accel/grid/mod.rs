@@ -131,9 +131,14 @@ impl Cells {
     /// What a step along each axis adds to a cell's number, modulo the range of numbers.
     #[inline(always)]
     fn strides(&self, line: &Line) -> [usize; 3] {
-        let [nx, ny, _] = self.lattice.cells.map(|n| n as usize);
-        let strides = [1, nx, nx * ny];
-        std::array::from_fn(|i| if line.inv[i] < 0.0 { strides[i].wrapping_neg() } else { strides[i] })
+        let cells = &self.lattice.cells;
+        let mut strides = [1, cells[0] as usize, cells[0] as usize * cells[1] as usize];
+        for (stride, inv) in strides.iter_mut().zip(&line.inv) {
+            if *inv < 0.0 {
+                *stride = stride.wrapping_neg();
+            }
+        }
+        strides
     }
 
     #[inline(always)]

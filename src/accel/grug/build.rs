@@ -9,7 +9,7 @@ use crate::{
     accel::{
         grid::lattice::Lattice,
         kdtree::{
-            build::{Builder, Emitted, Params, Ref, Task, bounds, depth_limit, refs, room, shared_room},
+            build::{Builder, Emitted, MAX_DEPTH, Params, Ref, Task, bounds, depth_limit, refs, room, shared_room},
             node::KdNode,
         },
         sah::BLOCK,
@@ -270,7 +270,8 @@ impl<P: Shapes + ?Sized> Aligned<'_, P> {
         out.groups.push(out.emitted.nodes.len() as u32);
         out.emitted.nodes.extend(task.cells.nodes());
         let depth = depth_limit(task.refs.len());
-        let task = Task { refs: task.refs, cell: self.around(task.cells), depth, room: task.room };
+        let task =
+            Task { refs: task.refs, cell: self.around(task.cells), depth, levels: MAX_DEPTH - 1, room: task.room };
         self.builder.emit(task, &mut out.emitted);
     }
 }

@@ -22,7 +22,7 @@ const TASK: usize = 4096;
 /// References that an object may have on average.
 const DUPLICATES: usize = 16;
 
-/// Most levels of a tree: the length of traversal stacks.
+/// Most nodes on a path: the length of traversal stacks.
 pub(in crate::accel) const MAX_DEPTH: usize = 64;
 
 /// An object while a tree is built: its number and a box around its part inside the node.
@@ -54,8 +54,10 @@ pub(in crate::accel) struct Task {
     pub(in crate::accel) refs: Vec<Ref>,
     /// Box of the node.
     pub(in crate::accel) cell: Aabb,
-    /// Splits that may still follow.
+    /// Splits that may still follow on a path, those that only cut off empty space left out.
     pub(in crate::accel) depth: usize,
+    /// Splits of any kind that may still follow on a path.
+    pub(in crate::accel) levels: usize,
     /// References and splits that the subtree may have together.
     pub(in crate::accel) room: usize,
 }
@@ -73,7 +75,8 @@ pub(in crate::accel) fn bounds(refs: &[Ref]) -> Aabb {
     refs.iter().fold(Aabb::EMPTY, |b, r| b.union(r.aabb))
 }
 
-/// Splits that a tree over `count` objects may have on a path: 8 + 1.3 log2 of it.
+/// Splits of objects that a tree over `count` of them may have on a path: 8 + 1.3 log2 of it. Cutting off empty space does not count: flat and
+/// hollow shapes would spend the depth on it.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small positive number")]
 pub(in crate::accel) fn depth_limit(count: usize) -> usize {
     ((8.0 + 1.3 * libm::log2(count.max(1) as f64)) as usize).min(MAX_DEPTH - 1)
@@ -103,7 +106,8 @@ pub(in crate::accel) struct Builder<'a, P: ?Sized> {
 impl<P: Shapes + ?Sized> Builder<'_, P> {
     /// Emits the subtree of a task behind what is in `out`.
     pub(in crate::accel) fn emit(&self, task: Task, out: &mut Emitted) {
-        let plan = if task.depth == 0 { None } else { Plan::best(&task.refs, task.cell, &self.params) };
+        let may_split = task.depth > 0 && task.levels > 0;
+        let plan = if may_split { Plan::best(&task.refs, task.cell, &self.params) } else { None };
         let split = plan.map(|plan| (plan, self.divide(&plan, &task)));
         let Some((plan, Some([lower, upper]))) = split else {
             let units = append_leaf(&mut out.items, task.refs.iter().map(|r| r.id.0), self.unit);
@@ -155,10 +159,11 @@ impl<P: Shapes + ?Sized> Builder<'_, P> {
             return None;
         }
         let rooms = shared_room(task.room, [lower.len(), upper.len()])?;
-        let depth = task.depth - 1;
+        let is_cut_off = lower.is_empty() || upper.is_empty();
+        let (depth, levels) = (task.depth - usize::from(!is_cut_off), task.levels - 1);
         Some([
-            Task { refs: lower, cell: below, depth, room: rooms[0] },
-            Task { refs: upper, cell: above, depth, room: rooms[1] },
+            Task { refs: lower, cell: below, depth, levels, room: rooms[0] },
+            Task { refs: upper, cell: above, depth, levels, room: rooms[1] },
         ])
     }
 

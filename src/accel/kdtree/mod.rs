@@ -29,7 +29,7 @@ use crate::{
     geom::{Aabb, Triangles},
     simd::Simd,
 };
-use build::{Builder, Emitted, Params, Task};
+use build::{Builder, Emitted, MAX_DEPTH, Params, Task};
 use node::{KdNode, MAX_NUMBER};
 use split::{Costs, MAX_BINS};
 use traverse::{Fast, Wide};
@@ -109,7 +109,13 @@ impl Tree {
         let refs = build::refs(shapes);
         let bounds = build::bounds(&refs);
         let count = refs.len();
-        let task = Task { refs, cell: bounds, depth: build::depth_limit(count), room: build::room(count) };
+        let task = Task {
+            refs,
+            cell: bounds,
+            depth: build::depth_limit(count),
+            levels: MAX_DEPTH - 1,
+            room: build::room(count),
+        };
         let mut out = Emitted::default();
         Builder { shapes, params: config.params(unit), unit }.emit(task, &mut out);
         (Self { nodes: out.nodes, bounds, reach: reach(&bounds) }, out.items)
