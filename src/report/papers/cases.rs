@@ -102,7 +102,9 @@ mod tests {
     #[test]
     fn sources_make_triangles_and_unknown_sizes_are_errors() {
         assert_eq!(Source::Soup(7).subject().unwrap().indices.len(), 7);
-        assert!(Source::Spd(SpdKind::Tetra, 2, 1000).subject().unwrap().indices.len() >= 64);
+        let tetra = Source::Spd(SpdKind::Tetra, 2, 1000).subject().unwrap();
+        assert!(tetra.indices.len() >= 16 && tetra.view.is_some());
+        assert_eq!(Source::Boxes(41).subject().unwrap().indices.len(), 492);
         assert!(Source::Spd(SpdKind::Tetra, 99, 1000).subject().is_err());
     }
 }
