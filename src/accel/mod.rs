@@ -215,10 +215,7 @@ pub trait Accel: Sized + Clone + Send + Sync + std::fmt::Debug + 'static {
         sinks: &[K],
         count: &mut C,
     ) {
-        for i in packet::bits(active) {
-            let (ray, best, sink) = (&rays[i], &mut best[i], &sinks[i]);
-            S::call(run::ClosestTask { accel: self, prims, ray, best, sink, count: &mut *count });
-        }
+        run::closest_singly::<S, Self, C, K>(self, prims, rays, active, best, sinks, count);
     }
 
     /// As [`Accel::occluded`] for each ray whose bit is set in `active`: the bits of those that are blocked.
@@ -231,13 +228,7 @@ pub trait Accel: Sized + Clone + Send + Sync + std::fmt::Debug + 'static {
         sinks: &[K],
         count: &mut C,
     ) -> u32 {
-        let mut blocked = 0;
-        for i in packet::bits(active) {
-            let (ray, sink) = (&rays[i], &sinks[i]);
-            let hit = S::call(run::OccludedTask { accel: self, prims, ray, sink, count: &mut *count });
-            blocked |= u32::from(hit) << i;
-        }
-        blocked
+        run::occluded_singly::<S, Self, C, K>(self, prims, rays, active, sinks, count)
     }
 
     /// Checks every invariant against `prims`.

@@ -1,6 +1,6 @@
 //! The queries as tasks, so that a structure's kernel is compiled once a level and sink, not at every place that asks.
 
-use super::{Accel, Closest, Counter, HitSink, TravRay};
+use super::{Accel, Closest, Counter, HitSink, TravRay, packet::bits};
 use crate::{
     geom::Triangles,
     simd::{Simd, Task},
@@ -41,6 +41,41 @@ impl<A: Accel, C: Counter, K: HitSink> Task for OccludedTask<'_, A, C, K> {
     fn run<S: Simd>(self) -> bool {
         self.accel.occluded::<S, C, K>(self.prims, self.ray, self.sink, self.count)
     }
+}
+
+/// The active rays of a packet, each by itself.
+#[inline(always)]
+pub(super) fn closest_singly<S: Simd, A: Accel, C: Counter, K: HitSink>(
+    accel: &A,
+    prims: &Triangles<'_>,
+    rays: &[TravRay],
+    active: u32,
+    best: &mut [Closest],
+    sinks: &[K],
+    count: &mut C,
+) {
+    for i in bits(active) {
+        let (ray, best, sink) = (&rays[i], &mut best[i], &sinks[i]);
+        S::call(ClosestTask { accel, prims, ray, best, sink, count: &mut *count });
+    }
+}
+
+/// As [`closest_singly`]: the bits of the rays that are blocked.
+#[inline(always)]
+pub(super) fn occluded_singly<S: Simd, A: Accel, C: Counter, K: HitSink>(
+    accel: &A,
+    prims: &Triangles<'_>,
+    rays: &[TravRay],
+    active: u32,
+    sinks: &[K],
+    count: &mut C,
+) -> u32 {
+    let mut blocked = 0;
+    for i in bits(active) {
+        let (ray, sink) = (&rays[i], &sinks[i]);
+        blocked |= u32::from(S::call(OccludedTask { accel, prims, ray, sink, count: &mut *count })) << i;
+    }
+    blocked
 }
 
 /// [`Accel::closest_packet`].

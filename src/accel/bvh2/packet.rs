@@ -7,8 +7,9 @@ use super::{
 use crate::{
     accel::{
         Closest, Counter, HitSink, TravRay,
-        packet::{PACKET, PacketRays, bits},
+        packet::{PACKET, PacketRays},
         query::{GROW, ORDINARY_MAX, SHRINK, SLACK},
+        run,
     },
     geom::Triangles,
     simd::{Lanes, Simd},
@@ -110,9 +111,7 @@ impl Bvh2 {
             if self.takes_packet(rays, active) {
                 self.closest_together::<S, C, K>(rays, active, best, sinks, count);
             } else {
-                for i in bits(active) {
-                    crate::accel::Accel::closest::<S, C, K>(self, prims, &rays[i], &mut best[i], &sinks[i], count);
-                }
+                run::closest_singly::<S, _, C, K>(self, prims, rays, active, best, sinks, count);
             }
         }
     }
@@ -175,10 +174,7 @@ impl Bvh2 {
             let part = if self.takes_packet(rays, active) {
                 self.occluded_together::<S, C, K>(rays, active, sinks, count)
             } else {
-                bits(active).fold(0, |part, i| {
-                    let hit = crate::accel::Accel::occluded::<S, C, K>(self, prims, &rays[i], &sinks[i], count);
-                    part | u32::from(hit) << i
-                })
+                run::occluded_singly::<S, _, C, K>(self, prims, rays, active, sinks, count)
             };
             blocked |= part << first;
         }

@@ -10,7 +10,7 @@ use crate::{
         block::BlockRay,
         query::{GROW, ORDINARY_MAX, SHRINK, SLACK},
     },
-    simd::{Halves, Lanes, Simd, branch_barrier},
+    simd::{Halves, Lanes, Scalar, Simd, branch_barrier},
 };
 
 /// Far children to visit: a link and a lower bound of the t at which the ray enters.
@@ -177,20 +177,15 @@ impl Bvh2 {
         if self.is_ordinary(ray) {
             self.closest_with::<S, _, C, K>(FastNode::<S>::new(ray, best.t_cull()), ray, best, sink, count);
         } else {
-            self.walk_closest_wide::<S, C, K>(ray, best, sink, count);
+            self.walk_closest_wide(ray, best, sink, count);
         }
     }
 
+    /// Rare, so compiled once, not for every level.
     #[cold]
     #[inline(never)]
-    fn walk_closest_wide<S: Simd, C: Counter, K: HitSink>(
-        &self,
-        ray: &TravRay,
-        best: &mut Closest,
-        sink: &K,
-        count: &mut C,
-    ) {
-        self.closest_with::<S, _, C, K>(WideNode::new(ray, best.t_high()), ray, best, sink, count);
+    fn walk_closest_wide<C: Counter, K: HitSink>(&self, ray: &TravRay, best: &mut Closest, sink: &K, count: &mut C) {
+        self.closest_with::<Scalar, _, C, K>(WideNode::new(ray, best.t_high()), ray, best, sink, count);
     }
 
     #[inline(always)]
@@ -203,15 +198,15 @@ impl Bvh2 {
         if self.is_ordinary(ray) {
             self.occluded_with::<S, _, C, K>(&FastNode::<S>::new(ray, ray.range().t_far), ray, sink, count)
         } else {
-            self.walk_occluded_wide::<S, C, K>(ray, sink, count)
+            self.walk_occluded_wide(ray, sink, count)
         }
     }
 
     #[cold]
     #[inline(never)]
-    fn walk_occluded_wide<S: Simd, C: Counter, K: HitSink>(&self, ray: &TravRay, sink: &K, count: &mut C) -> bool {
+    fn walk_occluded_wide<C: Counter, K: HitSink>(&self, ray: &TravRay, sink: &K, count: &mut C) -> bool {
         let test = WideNode::new(ray, f64::from(ray.range().t_far));
-        self.occluded_with::<S, _, C, K>(&test, ray, sink, count)
+        self.occluded_with::<Scalar, _, C, K>(&test, ray, sink, count)
     }
 
     /// Ordered walk: the nearer child first, the farther one on the stack with its entry.

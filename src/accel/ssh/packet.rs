@@ -7,10 +7,11 @@ use super::{
 };
 use crate::{
     accel::{
-        Accel, Closest, Counter, HitSink, TravRay,
+        Closest, Counter, HitSink, TravRay,
         block::TriBlock,
         packet::{PACKET, PacketRays, bits},
         query::{GROW, SHRINK},
+        run,
         topology::MAX_DEPTH,
     },
     geom::{Aabb, Triangles},
@@ -190,9 +191,7 @@ impl Ssh {
                 if members.count_ones() >= FEW {
                     self.closest_together::<S, C, K>(rays, members, backward, best, sinks, count);
                 } else {
-                    for i in bits(members) {
-                        self.closest::<S, C, K>(prims, &rays[i], &mut best[i], &sinks[i], count);
-                    }
+                    run::closest_singly::<S, _, C, K>(self, prims, rays, members, best, sinks, count);
                 }
             }
         }
@@ -282,10 +281,7 @@ impl Ssh {
                 if members.count_ones() >= FEW {
                     blocked |= self.occluded_together::<S, C, K>(rays, members, backward, sinks, count) << start;
                 } else {
-                    for i in bits(members) {
-                        let hit = self.occluded::<S, C, K>(prims, &rays[i], &sinks[i], count);
-                        blocked |= u32::from(hit) << (start + i);
-                    }
+                    blocked |= run::occluded_singly::<S, _, C, K>(self, prims, rays, members, sinks, count) << start;
                 }
             }
         }

@@ -12,7 +12,7 @@ use crate::{
         topology::MAX_DEPTH,
     },
     geom::Aabb,
-    simd::{Lanes, Simd, branch_barrier},
+    simd::{Lanes, Scalar, Simd, branch_barrier},
 };
 
 /// Absolute slack of the f32 node test: above every underflow it may meet.
@@ -258,20 +258,15 @@ impl Ssh {
         if self.is_ordinary(ray) {
             self.closest_with::<S, _, C, K>(FastSlabs::new(ray, best.t_cull()), ray, best, sink, count);
         } else {
-            self.walk_closest_wide::<S, C, K>(ray, best, sink, count);
+            self.walk_closest_wide(ray, best, sink, count);
         }
     }
 
+    /// Rare, so compiled once, not for every level.
     #[cold]
     #[inline(never)]
-    fn walk_closest_wide<S: Simd, C: Counter, K: HitSink>(
-        &self,
-        ray: &TravRay,
-        best: &mut Closest,
-        sink: &K,
-        count: &mut C,
-    ) {
-        self.closest_with::<S, _, C, K>(WideSlabs::new(ray, best.t_high()), ray, best, sink, count);
+    fn walk_closest_wide<C: Counter, K: HitSink>(&self, ray: &TravRay, best: &mut Closest, sink: &K, count: &mut C) {
+        self.closest_with::<Scalar, _, C, K>(WideSlabs::new(ray, best.t_high()), ray, best, sink, count);
     }
 
     #[inline(always)]
@@ -284,15 +279,15 @@ impl Ssh {
         if self.is_ordinary(ray) {
             self.occluded_with::<S, _, C, K>(&FastSlabs::new(ray, ray.range().t_far), ray, sink, count)
         } else {
-            self.walk_occluded_wide::<S, C, K>(ray, sink, count)
+            self.walk_occluded_wide(ray, sink, count)
         }
     }
 
     #[cold]
     #[inline(never)]
-    fn walk_occluded_wide<S: Simd, C: Counter, K: HitSink>(&self, ray: &TravRay, sink: &K, count: &mut C) -> bool {
+    fn walk_occluded_wide<C: Counter, K: HitSink>(&self, ray: &TravRay, sink: &K, count: &mut C) -> bool {
         let test = WideSlabs::new(ray, f64::from(ray.range().t_far));
-        self.occluded_with::<S, _, C, K>(&test, ray, sink, count)
+        self.occluded_with::<Scalar, _, C, K>(&test, ray, sink, count)
     }
 
     /// Ordered walk: the child that comes first along the order axis first, the other on the stack with its segment.
