@@ -4,7 +4,7 @@
 //! and SPEC is `NAME[:key=value,...]` as for `--accel`. One thread; times are CPU times where the system tells
 //! them, rates medians of five casts without counting.
 
-use std::{error::Error, fs, time::Instant};
+use std::{error::Error, fs, path::Path, time::Instant};
 
 use kinora::{
     accel::{
@@ -44,7 +44,7 @@ fn camera(size: &str, bounds: &Aabb) -> Result<Vec<Ray>, Box<dyn Error>> {
 }
 
 fn read_rays(path: &str, bounds: &Aabb) -> Result<Vec<Ray>, Box<dyn Error>> {
-    if !path.ends_with(".rays") {
+    if Path::new(path).extension().is_none_or(|e| e != "rays") {
         return camera(path, bounds);
     }
     let content = floats(fs::read(path)?.get(8..).ok_or("too short")?);

@@ -414,12 +414,12 @@ fn structures_over_boxes_visit_what_can_be_hit() {
         for object in 0..500 {
             due.visit(object);
         }
-        for i in 0..3 {
+        for grid in grids.iter().map(Some).chain([None]) {
             let mut visitor = fresh();
             let mut count = ReadCounter::default();
-            match i {
-                2 => kd.walk(&trav, &mut visitor, &mut count),
-                _ => grids[i].walk(&trav, &mut visitor, &mut count),
+            match grid {
+                None => kd.walk(&trav, &mut visitor, &mut count),
+                Some(grid) => grid.walk(&trav, &mut visitor, &mut count),
             };
             assert_eq!(visitor.best, due.best);
             assert_eq!(visitor.asked.len() as u64, count.prims);
