@@ -52,7 +52,7 @@ enum Rebuild {
     /// With the builder.
     Begun,
     /// Waits for a frame boundary.
-    Finished(Built),
+    Finished(Box<Built>),
     /// Failed once; not tried again.
     Failed,
 }
@@ -118,7 +118,7 @@ impl Group {
 
     fn try_update(&mut self, spec: &AccelSpec, rebuild_always: bool) -> Result<Work, FrameError> {
         match mem::take(&mut self.rebuild) {
-            Rebuild::Finished(built) => return self.swap(built, spec),
+            Rebuild::Finished(built) => return self.swap(*built, spec),
             other => self.rebuild = other,
         }
         if !self.deformed {
@@ -211,6 +211,6 @@ impl Group {
 
     /// Notes a finished rebuild, to be swapped in by the next `update`; `None` when it failed.
     pub(super) fn end_rebuild(&mut self, built: Option<Built>) {
-        self.rebuild = built.map_or(Rebuild::Failed, Rebuild::Finished);
+        self.rebuild = built.map_or(Rebuild::Failed, |built| Rebuild::Finished(Box::new(built)));
     }
 }
