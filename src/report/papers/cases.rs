@@ -64,7 +64,8 @@ impl Source<'_> {
 impl Case<'_> {
     /// `as in the paper`, `substituted` or nothing for a scene of ours.
     pub(super) fn standing(&self, triangles: usize) -> Option<&'static str> {
-        self.model.map(|_| if triangles == self.triangles { "as in the paper" } else { "substituted" })
+        let is_model = matches!(self.source, Source::Given(_)) && triangles == self.triangles;
+        self.model.map(|_| if is_model { "as in the paper" } else { "substituted" })
     }
 }
 
@@ -97,6 +98,8 @@ mod tests {
         assert_eq!(found("Toys", 11_141), None);
         let case = Case { model: Some("Toys"), triangles: 20, source: Source::Given(&models[1]) };
         assert_eq!((case.standing(20), case.standing(21)), (Some("as in the paper"), Some("substituted")));
+        let made = Case { source: Source::Soup(20), ..case };
+        assert_eq!((made.standing(20), Case { model: None, ..made }.standing(20)), (Some("substituted"), None));
     }
 
     #[test]
