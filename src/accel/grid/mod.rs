@@ -3,7 +3,7 @@
 //! Every cell owns the triangles that come near it; those whose plane passes a cell by are left out. By default a cell's triangles stand in
 //! blocks of four with their corners, so a triangle in several cells is stored as often; `leaf=ids` stores numbers, reads the
 //! corners from the mesh and keeps a small mailbox of triangles that the ray has met. Which cells a ray visits, and why none is
-//! lost, is told in [`lattice`].
+//! lost, is told in `lattice.rs`.
 //!
 //! Cost: build O(n) plus the references, in the current rayon pool; memory linear in n at automatic resolution, which gets coarser where
 //! triangles fill many cells. It cannot be refitted: every change of positions or topology asks for a rebuild. Choose it for

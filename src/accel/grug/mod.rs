@@ -10,7 +10,7 @@
 //!
 //! # Source
 //! Steffen and Zambreno, "Design and Evaluation of a Hardware Accelerated Ray Tracing Data Structure", 2009. Departures: crossings are
-//! recomputed in f64, not accumulated in integers (see [`super::grid::lattice`]); the resolution follows the number of groups unless given.
+//! recomputed in f64, not accumulated in integers (see `grid/lattice.rs`); the resolution follows the number of groups unless given.
 
 mod build;
 mod config;

@@ -2,9 +2,9 @@
 //!
 //! Splits follow the surface-area heuristic with a bonus for cutting off empty space, and cut triangles, not their boxes, by default. A leaf
 //! owns blocks of four triangles with their corners, so a triangle in several leaves is stored as often. Rays walk with a stack of
-//! intervals (Ericson's and Havran's "interval" form); crossings are bounded on both sides, so no leaf is lost to rounding (see [`traverse`]).
+//! intervals (Ericson's and Havran's "interval" form); crossings are bounded on both sides, so no leaf is lost to rounding (see `traverse.rs`).
 //!
-//! Cost: build O(n log n), in the current rayon pool; memory linear in n (see [`build`]). It cannot be refitted: every change of
+//! Cost: build O(n log n), in the current rayon pool; memory linear in n (see `build.rs`). It cannot be refitted: every change of
 //! positions or topology asks for a rebuild. Choose it for static geometry, and as what `grug` is measured against.
 //!
 //! # Source
