@@ -17,17 +17,17 @@ fn kinora() -> Command {
 /// A small wavy grid: quick to measure with every structure.
 fn mesh(folder: &Path) -> String {
     const SIDE: usize = 12;
-    let mut text = String::new();
+    let mut lines = Vec::new();
     for i in 0..SIDE * SIDE {
         let (x, y) = (i % SIDE, i / SIDE);
-        text += &format!("v {x} {} {y}\n", x * y % 5);
+        lines.push(format!("v {x} {} {y}", x * y % 5));
     }
     for i in (0..SIDE * (SIDE - 1)).filter(|i| i % SIDE < SIDE - 1) {
         let (a, b) = (i + 1, i + 1 + SIDE);
-        text += &format!("f {a} {} {} {b}\n", a + 1, b + 1);
+        lines.push(format!("f {a} {} {} {b}", a + 1, b + 1));
     }
     let path = folder.join("grid.obj");
-    fs::write(&path, text).expect("written");
+    fs::write(&path, lines.join("\n")).expect("written");
     path.display().to_string()
 }
 
@@ -95,7 +95,7 @@ fn every_structure_has_rows_and_all_files_are_written() {
     for file in &files {
         assert!(stdout.contains(file.as_str()), "{file} is named on stdout");
     }
-    let plots: Vec<&String> = files.iter().filter(|f| f.ends_with(".svg")).collect();
+    let plots: Vec<&String> = files.iter().filter(|f| Path::new(f).extension().is_some_and(|e| e == "svg")).collect();
     assert_eq!(plots.len(), report["plots"].as_array().map_or(0, Vec::len));
     assert_eq!(files.len(), plots.len() + 2, "{files:?}");
     let markdown = fs::read_to_string(out.join("structures.md")).expect("written");

@@ -322,7 +322,7 @@ mod tests {
             for part in at {
                 let t = t0 + (t1 - t0) * part;
                 let point: [f64; 3] = std::array::from_fn(|i| line.origin[i] + t * f64::from(dir[i]));
-                let slack = 1e-6 + 1e-14 * origin.abs().max_element() as f64;
+                let slack = 1e-6 + 1e-14 * f64::from(origin.abs().max_element());
                 let holds = |cell: &[u32; 3]| (0..3).all(|i| {
                     let (low, high) = (lattice.plane(i, cell[i]), lattice.plane(i, cell[i] + 1));
                     point[i] >= low - slack && point[i] <= high + slack

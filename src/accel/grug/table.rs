@@ -68,6 +68,11 @@ mod tests {
 
     proptest! {
         #[test]
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "the product is neither negative nor above 2^32"
+        )]
         fn a_cell_is_the_most_significant_bits_of_the_integer_coordinate(
             low in -1e3_f64..1e3, size in 1e-3_f64..1e3, at in 0.0..1.0_f64, bits in 6_u32..10,
         ) {

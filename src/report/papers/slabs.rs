@@ -307,10 +307,12 @@ mod tests {
         checks(&[pair]).into_iter().filter(Check::is_missed).map(|c| c.claim).collect()
     }
 
+    type Fault = fn(&mut Pair);
+
     #[test]
     fn the_papers_own_row_keeps_the_bounds_and_each_fault_is_named() {
         assert!(missed(pair()).is_empty(), "{:?}", missed(pair()));
-        let faults: [(&str, fn(&mut Pair)); 5] = [
+        let faults: [(&str, Fault); 5] = [
             ("answers", |p| p.differences = 1),
             ("node memory", |p| p.ssh.stats.node_bytes = 801),
             ("nodes a ray", |p| p.ssh.counts.nodes = 300),
