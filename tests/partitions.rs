@@ -15,7 +15,7 @@ use kinora::{
         Accel, AccelKind, AccelSpec, AnyAccel, AnyHit, BuildError, Closest, ReadCounter, TravRay, Visitor,
         grid::{BoxGrid, Grid, GridConfig, Resolution},
         grug::{CellOrder, Grug, GrugBytes, GrugConfig, StepMode},
-        kdtree::{BoxKdTree, KdConfig},
+        kdtree::{BoxKdTree, KdConfig, KdTree},
     },
     geom::{Aabb, Hit, Ray},
     glam::Vec3,
@@ -293,6 +293,27 @@ fn counted<A: Accel>(accel: &A, mesh: &Mesh, rays: &[Ray]) -> (Vec<Option<Hit>>,
         best.hit(&ray)
     };
     (rays.iter().map(&mut answer).collect(), count)
+}
+
+#[test]
+fn rays_beside_a_flat_sheet_test_none_of_it() {
+    let cells = (0..32).flat_map(|i| (0..32).map(move |j| (i as f32, j as f32)));
+    let mut corners: Vec<_> =
+        cells.map(|(x, y)| [Vec3::new(x, y, 0.0), Vec3::new(x + 1.0, y, 0.0), Vec3::new(x, y + 1.0, 0.0)]).collect();
+    corners.push([Vec3::new(0.0, 0.0, -20.0), Vec3::new(1.0, 0.0, -20.0), Vec3::new(0.0, 1.0, -20.0)]);
+    let mesh = Mesh::soup(&corners);
+    let mut random = Random(3);
+    let mut level = |size: f32| Vec3::new(16.0 + random.unit() * size, 16.0 + random.unit() * size, -0.05);
+    let rays: Vec<_> = (0..200)
+        .map(|_| {
+            let (from, to) = (level(8.0), level(8.0));
+            Ray { t_far: 1.0, ..Ray::new(from, to - from) }
+        })
+        .collect();
+    let tree = KdTree::build(&mesh.prims(), &KdConfig::default()).expect("the mesh builds");
+    let (hits, count) = counted(&tree, &mesh, &rays);
+    assert!(hits.iter().all(Option::is_none));
+    assert_eq!(count.blocks, 0);
 }
 
 #[test]

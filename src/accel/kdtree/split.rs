@@ -101,8 +101,13 @@ impl Search<'_> {
     fn faces(&mut self, refs: &[Ref]) {
         let content = super::build::bounds(refs);
         for axis in 0..3 {
-            self.offer(axis, content.min[axis], [0, self.count], false);
-            self.offer(axis, content.max[axis], [self.count, 0], true);
+            let (mut low, mut high) = (content.min[axis], content.max[axis]);
+            if low >= high {
+                // A cut at flat contents would leave the space on one side of them; one beside them leaves a slice.
+                (low, high) = (low.next_down(), high.next_up());
+            }
+            self.offer(axis, low, [0, self.count], false);
+            self.offer(axis, high, [self.count, 0], true);
         }
     }
 
