@@ -90,6 +90,30 @@ impl<S: Simd> PacketSlabs<S> {
         self.cut(node.plane, node.word.side(), segments)
     }
 
+    /// Cuts the rays of `mask` by two siblings; the one that comes first along the order axis is next, the other goes to the stack.
+    #[inline(always)]
+    fn descend(
+        &self,
+        stack: &mut Stack<S>,
+        nodes: [Node; 2],
+        order: usize,
+        mask: u32,
+        segments: Segments<S>,
+    ) -> Option<Entry<S>> {
+        let nearer = usize::from(self.backward[order]);
+        let (first, second) = (nodes[nearer], nodes[1 - nearer]);
+        let (segments1, segments2) = (self.cut_by(first, segments), self.cut_by(second, segments));
+        let (mask1, mask2) = (segments1.open() & mask, segments2.open() & mask);
+        let later = Entry { word: second.word, mask: mask2, segments: segments2 };
+        if mask1 == 0 {
+            return (mask2 != 0).then_some(Entry { word: predicted(second.word), ..later });
+        }
+        if mask2 != 0 {
+            stack.push(later);
+        }
+        Some(Entry { word: predicted(first.word), mask: mask1, segments: segments1 })
+    }
+
     /// Rays that may meet the box around the triangles of a block, or around one of them.
     #[inline(always)]
     fn meeting(&self, block: &TriBlock, lane: Option<usize>, mut segments: Segments<S>) -> u32 {
@@ -231,20 +255,9 @@ impl Ssh {
             } else {
                 count.node();
                 count.node();
-                let nodes = &self.pairs[word.index()].0;
-                let nearer = usize::from(slabs.backward[word.order()]);
-                let (first, second) = (nodes[nearer], nodes[1 - nearer]);
-                let (segments1, segments2) = (slabs.cut_by(first, segments), slabs.cut_by(second, segments));
-                let (mask1, mask2) = (segments1.open() & mask, segments2.open() & mask);
-                if mask1 != 0 {
-                    if mask2 != 0 {
-                        stack.push(Entry { word: second.word, mask: mask2, segments: segments2 });
-                    }
-                    (word, mask, segments) = (predicted(first.word), mask1, segments1);
-                    continue;
-                }
-                if mask2 != 0 {
-                    (word, mask, segments) = (predicted(second.word), mask2, segments2);
+                if let Some(next) = slabs.descend(&mut stack, self.pairs[word.index()].0, word.order(), mask, segments)
+                {
+                    Entry { word, mask, segments } = next;
                     continue;
                 }
             }
@@ -321,20 +334,9 @@ impl Ssh {
             } else {
                 count.node();
                 count.node();
-                let nodes = &self.pairs[word.index()].0;
-                let nearer = usize::from(slabs.backward[word.order()]);
-                let (first, second) = (nodes[nearer], nodes[1 - nearer]);
-                let (segments1, segments2) = (slabs.cut_by(first, segments), slabs.cut_by(second, segments));
-                let (mask1, mask2) = (segments1.open() & mask, segments2.open() & mask);
-                if mask1 != 0 {
-                    if mask2 != 0 {
-                        stack.push(Entry { word: second.word, mask: mask2, segments: segments2 });
-                    }
-                    (word, mask, segments) = (predicted(first.word), mask1, segments1);
-                    continue;
-                }
-                if mask2 != 0 {
-                    (word, mask, segments) = (predicted(second.word), mask2, segments2);
+                if let Some(next) = slabs.descend(&mut stack, self.pairs[word.index()].0, word.order(), mask, segments)
+                {
+                    Entry { word, mask, segments } = next;
                     continue;
                 }
             }

@@ -320,22 +320,9 @@ impl Ssh {
             } else {
                 count.node();
                 count.node();
-                let nodes = &self.pairs[word.index()].0;
-                let nearer = usize::from(test.is_backward(word.order()));
-                let (first, second) = (nodes[nearer], nodes[1 - nearer]);
-                let (segment1, segment2) = (test.cut_by(first, segment), test.cut_by(second, segment));
-                let (open1, open2) = (N::is_open(segment1), N::is_open(segment2));
-                if open1 {
-                    if open2 {
-                        stack.push((second.word, segment2));
-                    }
-                    word = predicted(first.word);
-                    segment = segment1;
-                    continue;
-                }
-                if open2 {
-                    word = predicted(second.word);
-                    segment = segment2;
+                let pair = &self.pairs[word.index()].0;
+                if let Some(next) = descend(&test, &mut stack, pair, word.order(), segment) {
+                    (word, segment) = next;
                     continue;
                 }
             }
@@ -378,22 +365,9 @@ impl Ssh {
             } else {
                 count.node();
                 count.node();
-                let nodes = &self.pairs[word.index()].0;
-                let nearer = usize::from(test.is_backward(word.order()));
-                let (first, second) = (nodes[nearer], nodes[1 - nearer]);
-                let (segment1, segment2) = (test.cut_by(first, segment), test.cut_by(second, segment));
-                let (open1, open2) = (N::is_open(segment1), N::is_open(segment2));
-                if open1 {
-                    if open2 {
-                        stack.push((second.word, segment2));
-                    }
-                    word = predicted(first.word);
-                    segment = segment1;
-                    continue;
-                }
-                if open2 {
-                    word = predicted(second.word);
-                    segment = segment2;
+                let pair = &self.pairs[word.index()].0;
+                if let Some(next) = descend(test, &mut stack, pair, word.order(), segment) {
+                    (word, segment) = next;
                     continue;
                 }
             }
@@ -403,6 +377,28 @@ impl Ssh {
             }
         }
     }
+}
+
+/// Cuts a ray by two siblings; the one that comes first along the order axis is next, the other goes to the stack.
+#[inline(always)]
+fn descend<N: SlabTest>(
+    test: &N,
+    stack: &mut Stack<N::T>,
+    nodes: &[Node; 2],
+    order: usize,
+    segment: Segment<N::T>,
+) -> Option<(Word, Segment<N::T>)> {
+    let nearer = usize::from(test.is_backward(order));
+    let (first, second) = (nodes[nearer], nodes[1 - nearer]);
+    let (segment1, segment2) = (test.cut_by(first, segment), test.cut_by(second, segment));
+    let (open1, open2) = (N::is_open(segment1), N::is_open(segment2));
+    if open1 {
+        if open2 {
+            stack.push((second.word, segment2));
+        }
+        return Some((predicted(first.word), segment1));
+    }
+    if open2 { Some((predicted(second.word), segment2)) } else { None }
 }
 
 /// What is left of a ray's range after one plane, by both kernels; `None` when nothing is.
