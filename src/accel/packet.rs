@@ -502,6 +502,24 @@ mod tests {
     }
 
     proptest! {
+        /// The point is exact, and the ray enters along x where it leaves along y: no slack but the test's own.
+        #[test]
+        fn a_box_that_a_ray_touches_in_one_point_is_met(
+            origin in prop::array::uniform3(-100_i8..100),
+            dir in prop::array::uniform3(prop_oneof![-100_i8..0, 1_i8..101]),
+            t in 1_u8..64,
+            sizes in prop::array::uniform3(1_u8..100),
+        ) {
+            let (origin, dir) = (Vec3::from(origin.map(f32::from)), Vec3::from(dir.map(f32::from)));
+            let touched = origin + dir * f32::from(t);
+            let size = Vec3::from(sizes.map(f32::from)) * dir.signum() * Vec3::new(1.0, -1.0, 1.0);
+            let aabb = Aabb::from_points([touched, touched + size]);
+            let ray = Ray { t_far: f32::from(t), ..Ray::new(origin, dir) };
+            for level in SimdLevel::available() {
+                prop_assert_eq!(meeting(level, &[ray; PACKET], aabb), 0xffff, "{}", level);
+            }
+        }
+
         #[test]
         fn a_box_around_a_point_of_a_ray_is_met(
             origin in prop::array::uniform3(-1e3_f32..1e3),
