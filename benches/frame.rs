@@ -9,7 +9,7 @@ use criterion::{Criterion, criterion_group, criterion_main};
 use kinora::{
     anim::ActiveClip,
     dynamics::{FrameConfig, FrameLoop, RebuildPolicy},
-    geom::Ray,
+    geom::{Forms, Ray},
     glam::{DAffine3, Vec3},
     scene::{ClipId, Scene, builtin, import},
     simd::{Simd, SimdLevel, Task, dispatch},
@@ -83,8 +83,13 @@ fn frames(c: &mut Criterion) {
         group.sample_size(20);
         let still = scene.clips.is_empty();
         let duration = scene.clips.get(clip as usize).map_or(1.0, |clip| clip.duration_s).max(0.1);
-        let config =
-            FrameConfig { accel: "bvh2".into(), top: "bvh2".into(), policy: RebuildPolicy::Async, pool: pool.clone() };
+        let config = FrameConfig {
+            accel: "bvh2".into(),
+            top: "bvh2".into(),
+            policy: RebuildPolicy::Async,
+            forms: Forms::EXACT,
+            pool: pool.clone(),
+        };
         let mut frames = FrameLoop::new(config).expect("known names");
         frames.add(Arc::new(scene), DAffine3::IDENTITY);
         let mut frame = 0_u32;

@@ -8,6 +8,7 @@ use glam::DAffine3;
 use kinora::{
     anim::{ActiveClip, animation_bounds},
     dynamics::{FrameConfig, FrameLoop, RebuildPolicy},
+    geom::Forms,
     render::{CameraView, Film, RenderSettings, Renderer, Shading},
     scene::{ClipId, import},
 };
@@ -27,8 +28,13 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let clips = if clip.index() < scene.clips.len() { &clips[..] } else { &[] };
 
     let pool = Arc::new(rayon::ThreadPoolBuilder::new().num_threads(arg(8, "2").parse()?).build()?);
-    let config =
-        FrameConfig { accel: "bvh2".into(), top: "bvh2".into(), policy: RebuildPolicy::Refit, pool: pool.clone() };
+    let config = FrameConfig {
+        accel: "bvh2".into(),
+        top: "bvh2".into(),
+        policy: RebuildPolicy::Refit,
+        forms: Forms::EXACT,
+        pool: pool.clone(),
+    };
     let mut frames = FrameLoop::new(config)?;
     frames.add(scene.clone(), DAffine3::IDENTITY);
     let (world, _) = frames.advance(&[clips])?;

@@ -14,7 +14,7 @@ use std::{
 use kinora::{
     anim::ActiveClip,
     dynamics::{FrameConfig, FrameLoop, RebuildPolicy},
-    geom::Ray,
+    geom::{Forms, Ray},
     glam::{DAffine3, Vec3},
     scene::{ClipId, Scene, import},
     simd::{Simd, SimdLevel, Task, dispatch},
@@ -86,7 +86,7 @@ fn advance(frames: &mut FrameLoop, frame: u16) -> usize {
 /// Allocations of frames 100 to 199 of a loop over `scenes`.
 fn steady_allocations(top: &str, policy: RebuildPolicy, inside: bool, scenes: &[Arc<Scene>]) -> u64 {
     let pool = Arc::new(rayon::ThreadPoolBuilder::new().num_threads(2).build().unwrap());
-    let config = FrameConfig { accel: "bvh2".into(), top: top.into(), policy, pool: pool.clone() };
+    let config = FrameConfig { accel: "bvh2".into(), top: top.into(), policy, forms: Forms::EXACT, pool: pool.clone() };
     let mut frames = FrameLoop::new(config).unwrap();
     for scene in scenes {
         frames.add(scene.clone(), DAffine3::IDENTITY);

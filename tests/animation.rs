@@ -14,7 +14,7 @@ use glam::DAffine3;
 use kinora::{
     anim::{ActiveClip, MotionClass, animation_bounds, classify},
     dynamics::{FrameConfig, FrameLoop, RebuildPolicy},
-    geom::InstanceId,
+    geom::{Forms, InstanceId},
     scene::{ClipId, Scene, import},
 };
 
@@ -89,7 +89,13 @@ fn pose_files_hold_the_very_vertices_of_the_world() {
 
 fn frame(scene: &Arc<Scene>, clips: &[ActiveClip]) -> Arc<kinora::world::World> {
     let pool = Arc::new(rayon::ThreadPoolBuilder::new().num_threads(2).build().unwrap());
-    let config = FrameConfig { accel: "list".to_owned(), top: "list".to_owned(), policy: RebuildPolicy::Refit, pool };
+    let config = FrameConfig {
+        accel: "list".to_owned(),
+        top: "list".to_owned(),
+        policy: RebuildPolicy::Refit,
+        forms: Forms::EXACT,
+        pool,
+    };
     let mut frames = FrameLoop::new(config).unwrap();
     frames.add(Arc::clone(scene), DAffine3::IDENTITY);
     // A frame before, so that the second one's vertices come through the reused buffers.

@@ -10,7 +10,7 @@ use kinora::{
     accel::AccelKind,
     anim::ActiveClip,
     dynamics::{FrameConfig, FrameError, FrameLoop, RebuildPolicy},
-    geom::{Hit, InstanceId, Ray},
+    geom::{Forms, Hit, InstanceId, Ray},
     glam::{DAffine3, DVec3, Vec3},
     scene::{ClipId, Scene, Trs},
     simd::{Simd, SimdLevel, Task, dispatch},
@@ -28,7 +28,7 @@ static POOLS: LazyLock<[Arc<rayon::ThreadPool>; 2]> = LazyLock::new(|| {
 });
 
 fn config(accel: &str, top: &str, policy: RebuildPolicy, threads: usize) -> FrameConfig {
-    FrameConfig { accel: accel.into(), top: top.into(), policy, pool: POOLS[threads - 1].clone() }
+    FrameConfig { accel: accel.into(), top: top.into(), policy, forms: Forms::EXACT, pool: POOLS[threads - 1].clone() }
 }
 
 fn looped(accel: &str, policy: RebuildPolicy, scene: Scene) -> FrameLoop {

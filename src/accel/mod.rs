@@ -28,6 +28,8 @@ pub use query::{AnyHit, Closest, HitSink, TravRay};
 pub use registry::{AccelKind, AccelSpec, AnyAccel, SpecError};
 pub use topology::Cut;
 
+pub use crate::geom::{Forms, Precision};
+
 use crate::{
     geom::{Aabb, Triangles},
     simd::Simd,

@@ -5,7 +5,7 @@ use std::cmp::Ordering;
 use glam::{Vec3, Vec3A};
 
 use crate::geom::{
-    Hit, InstanceId, PrimId, Ray, Triangles,
+    Forms, Hit, InstanceId, PrimId, Ray, Triangles,
     exact::{RayRange, TriangleHit},
 };
 
@@ -64,18 +64,28 @@ pub(super) const SLACK: f32 = f32::MIN_POSITIVE;
 pub struct TravRay {
     range: RayRange,
     ordinary: bool,
+    forms: Forms,
 }
 
 impl TravRay {
     /// A ray for places that need one and never look at it.
-    pub(crate) const STAND_IN: Self =
-        Self { range: RayRange { origin: Vec3::ZERO, dir: Vec3::X, t_near: 0.0, t_far: 0.0 }, ordinary: true };
+    pub(crate) const STAND_IN: Self = Self {
+        range: RayRange { origin: Vec3::ZERO, dir: Vec3::X, t_near: 0.0, t_far: 0.0 },
+        ordinary: true,
+        forms: Forms::EXACT,
+    };
 
     /// `None` when the ray can hit nothing: NaN or infinity in origin or direction, zero direction, empty range.
     ///
-    /// A negative `t_near` counts as 0.
+    /// A negative `t_near` counts as 0. Tests are exact.
     #[inline(always)]
     pub fn new(ray: &Ray) -> Option<Self> {
+        Self::with_forms(ray, Forms::EXACT)
+    }
+
+    /// As [`TravRay::new`], tested as `forms` says. Rays of a packet must agree in them.
+    #[inline(always)]
+    pub fn with_forms(ray: &Ray, forms: Forms) -> Option<Self> {
         let (t_near, t_far) = (ray.t_near, ray.t_far.min(f32::MAX));
         // Adding +0 turns -0 into +0. Ordinary numbers are finite.
         let dir = ray.dir + Vec3::ZERO;
@@ -88,6 +98,7 @@ impl TravRay {
         Some(Self {
             range: RayRange { origin: ray.origin, dir, t_near: t_near.max(0.0) + 0.0, t_far: t_far + 0.0 },
             ordinary,
+            forms,
         })
     }
 
@@ -101,6 +112,12 @@ impl TravRay {
     #[inline(always)]
     pub(super) fn inv(&self) -> Vec3 {
         reciprocal(self.range.dir)
+    }
+
+    /// How the ray is tested.
+    #[inline(always)]
+    pub fn forms(&self) -> Forms {
+        self.forms
     }
 
     /// True when f32 node tests on boxes within 2^60 of 0 neither overflow nor lose precision by underflow.

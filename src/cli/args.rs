@@ -2,7 +2,7 @@
 
 use clap::{ArgAction, Args, Parser, Subcommand};
 use kinora::{
-    accel::{AccelKind, AccelSpec},
+    accel::{AccelKind, AccelSpec, Precision},
     world::TopKind,
 };
 
@@ -84,13 +84,6 @@ impl CommonArgs {
     }
 }
 
-/// How exact hits are.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Precision {
-    /// Correctly rounded.
-    Exact,
-}
-
 const THREADS_HELP: &str = "Worker threads [default: KINORA_THREADS, else what the scheduler granted, else all cores]";
 
 fn accel_help() -> String {
@@ -98,9 +91,11 @@ fn accel_help() -> String {
 }
 
 fn precision(text: &str) -> Result<Precision, String> {
-    match text {
-        "exact" => Ok(Precision::Exact),
-        "fast" => Err("this version has exact kernels only; leave the option out or say `exact`".to_owned()),
-        _ => Err("expected `exact`".to_owned()),
+    match text.parse() {
+        Ok(Precision::Exact) => Ok(Precision::Exact),
+        Ok(Precision::Fast) => {
+            Err("this version has exact kernels only; leave the option out or say `exact`".to_owned())
+        }
+        Err(_) => Err("expected `exact`".to_owned()),
     }
 }

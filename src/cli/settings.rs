@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use kinora::{
+    accel::Precision,
     dynamics::{FrameConfig, RebuildPolicy},
     simd::SimdLevel,
 };
@@ -19,6 +20,8 @@ pub(crate) struct Settings {
     pub(crate) accel: String,
     /// Structure over groups.
     pub(crate) top: String,
+    /// How exact answers are.
+    pub(crate) precision: Precision,
     /// SIMD level that this machine has.
     pub(crate) simd: SimdLevel,
     /// How much to print.
@@ -41,6 +44,7 @@ impl Settings {
             pool: Arc::new(pool),
             accel: args.accel.to_string(),
             top: args.top.name().to_owned(),
+            precision: args.precision,
             simd: simd(args.simd)?,
             verbosity: args.verbosity(),
         })
@@ -53,7 +57,13 @@ impl Settings {
 
     /// Settings of a frame loop over these.
     pub(crate) fn frame_config(&self, policy: RebuildPolicy) -> FrameConfig {
-        FrameConfig { accel: self.accel.clone(), top: self.top.clone(), policy, pool: Arc::clone(&self.pool) }
+        FrameConfig {
+            accel: self.accel.clone(),
+            top: self.top.clone(),
+            policy,
+            forms: self.precision.into(),
+            pool: Arc::clone(&self.pool),
+        }
     }
 }
 

@@ -1,5 +1,7 @@
 use std::{sync::Arc, time::Duration};
 
+use crate::geom::Forms;
+
 /// Why a frame could not be made.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -91,6 +93,8 @@ pub struct FrameConfig {
     pub top: String,
     /// How trees are kept good.
     pub policy: RebuildPolicy,
+    /// How vertices are computed and rays answered: `Precision::Exact.into()` but for measurements.
+    pub forms: Forms,
     /// Pool that deform, refit and synchronous builds run in.
     pub pool: Arc<rayon::ThreadPool>,
 }

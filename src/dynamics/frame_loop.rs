@@ -141,7 +141,9 @@ impl FrameLoop {
         self.counts.swaps += work.swaps;
         self.counts.quality_max = self.counts.quality_max.max(self.stage.quality());
         let mut world = self.worlds.take(World::default);
-        self.stage.fill(Arc::get_mut(&mut world).expect("a taken buffer has one owner"), self.top);
+        let next = Arc::get_mut(&mut world).expect("a taken buffer has one owner");
+        self.stage.fill(next, self.top);
+        next.forms = self.config.forms;
         self.worlds.keep(world.clone());
         times.refit = began.elapsed();
         Ok((world, times))

@@ -8,7 +8,7 @@ use super::{FrameConfig, FrameError, FrameLoop, RebuildPolicy, grouping::Groupin
 use crate::{
     accel::PACKET,
     anim::ActiveClip,
-    geom::{Hit, Ray},
+    geom::{Forms, Hit, Ray},
     scene::{ClipId, Scene},
     simd::{Scalar, Simd, SimdLevel, Task, dispatch},
     world::World,
@@ -23,7 +23,7 @@ use scenes::{Random, bodies, burst, figure, still};
 
 fn config(accel: &str, policy: RebuildPolicy) -> FrameConfig {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().unwrap();
-    FrameConfig { accel: accel.into(), top: "bvh2".into(), policy, pool: Arc::new(pool) }
+    FrameConfig { accel: accel.into(), top: "bvh2".into(), policy, forms: Forms::EXACT, pool: Arc::new(pool) }
 }
 
 fn at(time_s: f64) -> [ActiveClip; 1] {

@@ -3,10 +3,12 @@
 mod aabb;
 pub mod exact;
 mod hit;
+mod precision;
 mod ray;
 mod triangles;
 
 pub use aabb::Aabb;
 pub use hit::{Hit, InstanceId, PrimId};
+pub use precision::{Forms, Precision};
 pub use ray::Ray;
 pub use triangles::Triangles;

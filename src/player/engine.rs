@@ -282,6 +282,7 @@ mod tests {
             accel: "list".to_owned(),
             top: "list".to_owned(),
             policy: RebuildPolicy::default(),
+            forms: crate::geom::Forms::EXACT,
             pool: Arc::new(pool),
         };
         TraceEngine::new(config, SimdLevel::best(), 1, Unfinished::default())

@@ -19,7 +19,7 @@ use glam::Vec3;
 
 use crate::{
     anim::Pose,
-    geom::{Aabb, InstanceId, PrimId},
+    geom::{Aabb, Forms, InstanceId, PrimId},
     scene::{PartInstance, Scene},
 };
 
@@ -64,6 +64,7 @@ pub struct World {
     pub(crate) actors: Vec<ActorFrame>,
     pub(crate) groups: Vec<GroupFrame>,
     pub(crate) top: Top,
+    pub(crate) forms: Forms,
 }
 
 impl fmt::Debug for World {
@@ -83,6 +84,11 @@ impl World {
     /// The least box around everything traced: the triangles with finite corners.
     pub fn bounds(&self) -> Aabb {
         self.groups.iter().fold(Aabb::EMPTY, |all, group| all.union(group.bounds))
+    }
+
+    /// How the world was made and how its queries are answered.
+    pub fn forms(&self) -> Forms {
+        self.forms
     }
 
     /// All part instances; an [`InstanceId`] is an index here.

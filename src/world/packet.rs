@@ -7,7 +7,7 @@ use super::{
 };
 use crate::{
     accel::{Closest, PACKET, PacketBoxes, TravRay},
-    geom::{Hit, Ray},
+    geom::{Forms, Hit, Ray},
     simd::Simd,
 };
 
@@ -23,10 +23,10 @@ struct Packet {
 impl Packet {
     /// `None` when no ray can hit anything.
     #[inline(always)]
-    fn new(rays: &[Ray]) -> Option<Self> {
+    fn new(rays: &[Ray], forms: Forms) -> Option<Self> {
         let mut packet = Self { rays: [TravRay::STAND_IN; PACKET], active: 0, len: rays.len() };
         for (i, ray) in rays.iter().enumerate().take(PACKET) {
-            if let Some(ray) = TravRay::new(ray) {
+            if let Some(ray) = TravRay::with_forms(ray, forms) {
                 packet.rays[i] = ray;
                 packet.active |= 1 << i;
             }
@@ -66,7 +66,7 @@ impl World {
     pub fn nearest_hits<S: Simd>(&self, rays: &[Ray], hits: &mut [Option<Hit>]) {
         assert!(rays.len() <= PACKET && rays.len() <= hits.len(), "at most {PACKET} rays, a hit for each");
         hits.fill(None);
-        let Some(packet) = Packet::new(rays) else { return };
+        let Some(packet) = Packet::new(rays, self.forms) else { return };
         let mut best: [Closest; PACKET] = std::array::from_fn(|i| Closest::new(&packet.rays[i]));
         if self.groups.len() <= FLAT {
             let order = self.top.order(&self.groups, packet.leader());
@@ -101,7 +101,7 @@ impl World {
     #[inline(always)]
     pub fn blocked<S: Simd>(&self, rays: &[Ray]) -> u32 {
         assert!(rays.len() <= PACKET, "at most {PACKET} rays");
-        let Some(packet) = Packet::new(rays) else { return 0 };
+        let Some(packet) = Packet::new(rays, self.forms) else { return 0 };
         let mut blocked = 0;
         if self.groups.len() <= FLAT {
             let boxes = PacketBoxes::new::<S>(&packet.rays);

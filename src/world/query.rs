@@ -40,7 +40,7 @@ impl World {
 
     #[inline(always)]
     fn closest<S: Simd, F: Filter>(&self, ray: &Ray, filter: F) -> Option<Hit> {
-        let trav = TravRay::new(ray)?;
+        let trav = TravRay::with_forms(ray, self.forms)?;
         let mut best = Closest::new(&trav);
         if let [group] = &self.groups[..] {
             group.closest::<S, F>(&trav, &mut best, filter);
@@ -55,7 +55,7 @@ impl World {
 
     #[inline(always)]
     fn occluded<S: Simd, F: Filter>(&self, ray: &Ray, filter: F) -> bool {
-        let Some(trav) = TravRay::new(ray) else { return false };
+        let Some(trav) = TravRay::with_forms(ray, self.forms) else { return false };
         if let [group] = &self.groups[..] {
             return group.occluded::<S, F>(&trav, filter);
         }

@@ -7,6 +7,7 @@ use std::sync::Arc;
 use glam::{DAffine3, DQuat, DVec3, Vec2, Vec3, Vec4};
 use kinora::{
     dynamics::{FrameConfig, FrameLoop, RebuildPolicy},
+    geom::Forms,
     render::{CameraView, Film, RenderSettings, Renderer},
     scene::{
         AlphaMode, Image, ImageId, Light, LightId, LightKind, LocalTransform, Material, MaterialId, Mesh, MeshId,
@@ -82,7 +83,13 @@ impl Stage {
 
     pub fn world_with(self, accel: &str) -> Arc<World> {
         let pool = Arc::new(rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap());
-        let config = FrameConfig { accel: accel.into(), top: "bvh2".into(), policy: RebuildPolicy::Refit, pool };
+        let config = FrameConfig {
+            accel: accel.into(),
+            top: "bvh2".into(),
+            policy: RebuildPolicy::Refit,
+            forms: Forms::EXACT,
+            pool,
+        };
         let mut frames = FrameLoop::new(config).unwrap();
         frames.add(Arc::new(self.scene), DAffine3::IDENTITY);
         frames.advance(&[&[]]).unwrap().0
