@@ -50,7 +50,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut rgba = Vec::new();
     for _ in 0..arg(7, "1").parse()? {
         let start = Instant::now();
-        let rays = pool.install(|| renderer.render(&world, &camera, &settings, &mut film));
+        let rays = pool.install(|| renderer.render(&world, &camera, &settings, &mut film))?;
         let traced = start.elapsed();
         pool.install(|| film.to_srgb8(&mut rgba));
         let encoded = start.elapsed().saturating_sub(traced);

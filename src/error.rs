@@ -1,6 +1,9 @@
 //! One error for the top layers; each module has its own, folded in here.
 
-use crate::{accel::BuildError, dynamics::FrameError, output::OutputError, scene::import::ImportError};
+use crate::{
+    accel::BuildError, dynamics::FrameError, output::OutputError, render::RenderError, scene::import::ImportError,
+    simd::FloatModeError,
+};
 
 /// What any of kinora's layers may report.
 #[derive(Debug, thiserror::Error)]
@@ -15,6 +18,12 @@ pub enum Error {
     /// The frame loop failed.
     #[error(transparent)]
     Frame(#[from] FrameError),
+    /// A picture could not be rendered.
+    #[error(transparent)]
+    Render(#[from] RenderError),
+    /// Foreign code changed how a thread computes.
+    #[error(transparent)]
+    FloatMode(#[from] FloatModeError),
     /// Frames could not be written.
     #[error(transparent)]
     Output(#[from] OutputError),

@@ -62,7 +62,7 @@ fn threads_levels_and_structures_change_no_bit() {
         let mut reference = Film::new(31, 23);
         let world = fair("list");
         let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
-        pool.install(|| Renderer::default().render(&world, &view(), &settings, &mut reference));
+        pool.install(|| Renderer::default().render(&world, &view(), &settings, &mut reference)).unwrap();
         for accel in ["list", "bvh2"] {
             let world = fair(accel);
             for simd in SimdLevel::available() {
@@ -83,7 +83,7 @@ fn a_renderer_used_before_gives_the_same_picture() {
     let mut film = Film::new(90, 10);
     for (w, size) in [(&world, [90, 10]), (&other, [40, 30]), (&world, [40, 30])] {
         film.resize(size[0], size[1]);
-        renderer.render(w, &view(), &settings, &mut film);
+        renderer.render(w, &view(), &settings, &mut film).unwrap();
     }
     assert_eq!(film.color, fresh.color);
     assert_eq!(film.depth, fresh.depth);
@@ -106,11 +106,11 @@ fn two_renders_of_two_samples_make_one_of_four() {
 fn an_empty_world_is_background() {
     let world = Stage::default().world();
     let mut film = Film::new(9, 5);
-    let rays = Renderer::default().render(&world, &front(3.0), &RenderSettings::default(), &mut film);
+    let rays = Renderer::default().render(&world, &front(3.0), &RenderSettings::default(), &mut film).unwrap();
     assert_eq!(rays, 0);
     assert!(film.color.iter().all(|c| c[3] == 0.0 && c[0] > 0.0));
     assert!(film.depth.iter().all(|d| d.is_infinite()) && film.instance.iter().all(|&i| i == 0));
-    Renderer::default().render(&world, &front(3.0), &RenderSettings::default(), &mut Film::new(0, 0));
+    Renderer::default().render(&world, &front(3.0), &RenderSettings::default(), &mut Film::new(0, 0)).unwrap();
 }
 
 #[test]

@@ -4,7 +4,7 @@ use super::{AnyAccel, AnyHit, Closest, PACKET, TravRay, packet::bits};
 use crate::{
     geom::{Hit, Ray, Triangles},
     glam::Vec3,
-    simd::{Simd, SimdLevel, Task, dispatch},
+    simd::{FloatModeError, Simd, SimdLevel, Task, check_float_mode, dispatch},
 };
 
 impl AnyAccel {
@@ -12,6 +12,9 @@ impl AnyAccel {
     ///
     /// Rays go singly where `packet` is 1, else in packets of up to `packet` consecutive ones, which pays for rays close together. The
     /// answers do not depend on it, nor on `level`. On the calling thread; no allocation.
+    ///
+    /// # Errors
+    /// When foreign code changed how this thread computes; `out` is then unchanged.
     ///
     /// # Panics
     /// When `out` is shorter than `rays`, `packet` is 0 or above [`PACKET`], or the machine lacks `level`.
@@ -22,18 +25,32 @@ impl AnyAccel {
         packet: usize,
         level: SimdLevel,
         out: &mut [Option<Hit>],
-    ) {
+    ) -> Result<(), FloatModeError> {
         assert!((1..=PACKET).contains(&packet), "packets of {packet} rays");
+        check_float_mode()?;
         dispatch(level, ClosestBatch { accel: self, prims, rays, packet, out: &mut out[..rays.len()] });
+        Ok(())
     }
 
     /// Whether every ray is blocked, as [`AnyAccel::closest_hits`].
     ///
+    /// # Errors
+    /// As there.
+    ///
     /// # Panics
     /// As there.
-    pub fn blocked(&self, prims: &Triangles<'_>, rays: &[Ray], packet: usize, level: SimdLevel, out: &mut [bool]) {
+    pub fn blocked(
+        &self,
+        prims: &Triangles<'_>,
+        rays: &[Ray],
+        packet: usize,
+        level: SimdLevel,
+        out: &mut [bool],
+    ) -> Result<(), FloatModeError> {
         assert!((1..=PACKET).contains(&packet), "packets of {packet} rays");
+        check_float_mode()?;
         dispatch(level, BlockedBatch { accel: self, prims, rays, packet, out: &mut out[..rays.len()] });
+        Ok(())
     }
 }
 

@@ -32,7 +32,7 @@ pub use crate::geom::{Forms, Precision};
 
 use crate::{
     geom::{Aabb, Triangles},
-    simd::Simd,
+    simd::{FloatModeError, Simd},
 };
 
 /// Why a structure could not be built.
@@ -72,6 +72,9 @@ pub enum BuildError {
     /// A structure's name or setting that does not exist.
     #[error(transparent)]
     Spec(#[from] SpecError),
+    /// Foreign code changed how the calling thread computes.
+    #[error(transparent)]
+    FloatMode(#[from] FloatModeError),
 }
 
 /// Outcome of a refit.

@@ -15,7 +15,7 @@ use super::{
 };
 use crate::{
     geom::{Aabb, Triangles},
-    simd::Simd,
+    simd::{Simd, check_float_mode},
 };
 
 /// A structure's name or a setting that does not exist.
@@ -103,8 +103,10 @@ macro_rules! register_accels {
             /// Builds over `prims` with `key=value` settings, in the current rayon pool.
             ///
             /// # Errors
-            /// Unknown settings, an index out of range, or a limit of the structure passed.
+            /// Unknown settings, an index out of range, a limit of the structure passed, or a calling thread that does not compute as
+            /// [`check_float_mode`] asks.
             pub fn build(self, settings: &[(String, String)], prims: &Triangles<'_>) -> Result<AnyAccel, BuildError> {
+                check_float_mode()?;
                 match self {
                     $(Self::$kind => Ok(AnyAccel::$kind(<$ty>::build(prims, &configure::<$ty>(settings)?)?)),)*
                 }
@@ -302,7 +304,7 @@ impl AccelSpec {
     /// Builds over `prims`, in the current rayon pool.
     ///
     /// # Errors
-    /// An index out of range, or a limit of the structure passed.
+    /// As [`AccelKind::build`].
     pub fn build(&self, prims: &Triangles<'_>) -> Result<AnyAccel, BuildError> {
         self.kind.build(&self.settings, prims)
     }

@@ -2,7 +2,9 @@
 
 use std::fmt;
 
-use kinora::{accel::BuildError, dynamics::FrameError, output::OutputError, scene::import::ImportError};
+use kinora::{
+    accel::BuildError, dynamics::FrameError, output::OutputError, render::RenderError, scene::import::ImportError,
+};
 
 /// Why a command ended early.
 #[derive(Debug)]
@@ -48,6 +50,12 @@ impl fmt::Display for CliError {
 impl From<ImportError> for CliError {
     fn from(error: ImportError) -> Self {
         Self::Usage(error.to_string())
+    }
+}
+
+impl From<RenderError> for CliError {
+    fn from(error: RenderError) -> Self {
+        Self::Failed(error.to_string())
     }
 }
 

@@ -9,6 +9,9 @@ pub enum FrameError {
     /// A structure could not be built.
     #[error(transparent)]
     Build(#[from] crate::accel::BuildError),
+    /// Foreign code changed how a thread computes.
+    #[error(transparent)]
+    FloatMode(#[from] crate::simd::FloatModeError),
     /// The background builder panicked. The loop goes on with the trees it has.
     #[error("the background builder panicked: {0}")]
     BuilderPanicked(String),

@@ -14,6 +14,7 @@ use crate::{
     accel::{AccelSpec, BuildError},
     anim::ActiveClip,
     scene::Scene,
+    simd::check_float_mode,
     world::{TopKind, World},
 };
 
@@ -97,9 +98,10 @@ impl FrameLoop {
     /// Poses every actor (`clips[i]` for actor i, none for the rest pose) and returns the frame's world.
     ///
     /// # Errors
-    /// When a build fails, the background builder panicked, or more is placed than numbers allow for. The loop
+    /// When foreign code changed how this thread or the pool's compute, a build fails, the background builder panicked, or more is placed than numbers allow for. The loop
     /// can go on after a failed rebuild; the group concerned keeps its refitted tree.
     pub fn advance(&mut self, clips: &[&[ActiveClip]]) -> Result<(Arc<World>, StageTimes), FrameError> {
+        check_float_mode()?;
         self.stage.settle()?;
         self.take_rebuilds()?;
         let pool = self.config.pool.clone();
@@ -116,6 +118,7 @@ impl FrameLoop {
 
     /// Pose, deform, refit; in the loop's pool.
     fn make(&mut self, clips: &[&[ActiveClip]]) -> Result<(Arc<World>, StageTimes), FrameError> {
+        check_float_mode()?;
         let frame = self.counts.frames;
         let mut times = StageTimes::default();
         self.worlds.for_each_free(World::clear);

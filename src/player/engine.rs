@@ -180,7 +180,8 @@ impl TraceEngine {
         let (width, height) = traced_size(shot.width, shot.height, divisor);
         self.film.resize(width, height);
         let Self { renderer, film, .. } = self;
-        let rays = pool.install(|| renderer.render_until(&world, &view, &settings, film, stop));
+        let rays =
+            pool.install(|| renderer.render_until(&world, &view, &settings, film, stop)).map_err(|e| e.to_string())?;
         let times = FrameTimes { stages, trace: begun.elapsed() };
         Ok(rays.map(|rays| Pass { times, rays, view, bounds: world.bounds() }))
     }

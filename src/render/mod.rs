@@ -42,7 +42,16 @@ pub use camera::CameraView;
 pub use film::Film;
 pub use renderer::Renderer;
 
-use crate::simd::SimdLevel;
+use crate::simd::{FloatModeError, SimdLevel};
+
+/// Why a picture could not be rendered.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum RenderError {
+    /// Foreign code changed how a thread computes.
+    #[error(transparent)]
+    FloatMode(#[from] FloatModeError),
+}
 
 /// What a pixel shows.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -11,7 +11,7 @@ use std::{
 use rayon::prelude::*;
 
 use super::{
-    CameraView, Film, RenderSettings,
+    CameraView, Film, RenderError, RenderSettings,
     context::{FrameContext, InstanceInfo},
     lights::LightSource,
     prepared::PreparedScene,
@@ -24,7 +24,7 @@ use crate::{
     anim::Pose,
     geom::Aabb,
     scene::{PartInstance, Scene},
-    simd::dispatch,
+    simd::{check_float_mode, dispatch},
     world::World,
 };
 
@@ -36,13 +36,14 @@ const SKY_LEVELS: [f32; 2] = [0.30, 1.0];
 ///
 /// ```
 /// use kinora::render::{CameraView, Film, Renderer, RenderSettings};
-/// # fn frame(world: &kinora::world::World) {
+/// # fn frame(world: &kinora::world::World) -> Result<(), kinora::render::RenderError> {
 /// let mut renderer = Renderer::default();
 /// let mut film = Film::new(1280, 720);
 /// let camera = CameraView::framing(world.bounds(), 1280.0 / 720.0);
-/// renderer.render(world, &camera, &RenderSettings::default(), &mut film);
+/// renderer.render(world, &camera, &RenderSettings::default(), &mut film)?;
 /// let mut rgba = Vec::new();
 /// film.to_srgb8(&mut rgba);
+/// # Ok(())
 /// # }
 /// ```
 #[derive(Debug, Default)]
@@ -94,14 +95,27 @@ impl Renderer {
     ///
     /// The picture depends on its arguments alone: not on threads, SIMD level, structures or earlier frames.
     ///
+    /// # Errors
+    /// When foreign code changed how one of the threads computes.
+    ///
     /// # Panics
     /// When the machine lacks the SIMD level of `settings`.
-    pub fn render(&mut self, world: &World, camera: &CameraView, settings: &RenderSettings, film: &mut Film) -> u64 {
-        self.render_until(world, camera, settings, film, &AtomicBool::new(false)).unwrap_or(0)
+    pub fn render(
+        &mut self,
+        world: &World,
+        camera: &CameraView,
+        settings: &RenderSettings,
+        film: &mut Film,
+    ) -> Result<u64, RenderError> {
+        let rays = self.render_until(world, camera, settings, film, &AtomicBool::new(false))?;
+        Ok(rays.unwrap_or(0))
     }
 
     /// As [`Renderer::render`], but gives up soon after `stop` becomes true: then `None`, and the film's content is
     /// unspecified.
+    ///
+    /// # Errors
+    /// As [`Renderer::render`]; the film's content is then unspecified too.
     ///
     /// # Panics
     /// As [`Renderer::render`].
@@ -112,12 +126,13 @@ impl Renderer {
         settings: &RenderSettings,
         film: &mut Film,
         stop: &AtomicBool,
-    ) -> Option<u64> {
+    ) -> Result<Option<u64>, RenderError> {
+        check_float_mode()?;
         film.resize(film.width, film.height);
         film.display = !settings.shading.is_lit();
         film.simd = settings.simd;
         if film.color.is_empty() {
-            return Some(0);
+            return Ok(Some(0));
         }
         self.begin(world);
         let ctx = self.context(world, camera, settings, [film.width, film.height]);
@@ -128,16 +143,18 @@ impl Renderer {
             .zip(film.depth.par_chunks_mut(rows))
             .zip(film.instance.par_chunks_mut(rows))
             .enumerate()
-            .for_each(|(index, ((color, depth), instance))| {
+            .try_for_each(|(index, ((color, depth), instance))| {
                 if stop.load(Relaxed) {
-                    return;
+                    return Ok(());
                 }
+                check_float_mode()?;
                 #[expect(clippy::cast_possible_truncation, reason = "below the film's height")]
                 let top = (index * BAND_ROWS) as u32;
                 let band = Band { top, color, depth, instance };
                 rays.fetch_add(dispatch(ctx.settings.simd, BandTask { ctx: &ctx, band }), Relaxed);
-            });
-        (!stop.load(Relaxed)).then(|| rays.into_inner())
+                Ok::<_, RenderError>(())
+            })?;
+        Ok((!stop.load(Relaxed)).then(|| rays.into_inner()))
     }
 
     /// Brings the lists up to the world's actors, instances and lights.

@@ -7,6 +7,7 @@
 
 mod barrier;
 mod dispatch;
+mod float_mode;
 mod lanes;
 mod level;
 mod scalar;
@@ -15,9 +16,12 @@ mod x86;
 
 pub use barrier::branch_barrier;
 pub use dispatch::{Task, dispatch};
+pub use float_mode::{FloatModeError, check_float_mode};
 pub use lanes::{Halves, Lanes, Simd};
 pub use level::SimdLevel;
 pub use scalar::{Array, Scalar};
 
+#[cfg(test)]
+mod float_mode_tests;
 #[cfg(test)]
 mod tests;

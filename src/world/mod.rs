@@ -4,7 +4,10 @@
 //! structure. A [`top`](TopKind) level finds the groups that a ray may hit. How instances are grouped
 //! changes no byte of any answer: a group's own triangle numbers are ordered as (instance, prim), the best
 //! hit is shared over groups, and boxes only prove misses.
+//!
+//! Batches ([`World::hit_all`], [`World::block_all`]) ask [`crate::simd::check_float_mode`] themselves; single rays and packets do not.
 
+mod batch;
 mod group;
 mod packet;
 mod query;

@@ -100,7 +100,7 @@ impl Stage {
 pub fn shoot(world: &World, camera: &CameraView, settings: &RenderSettings, width: u32, height: u32) -> Film {
     let mut film = Film::new(width, height);
     let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().unwrap();
-    pool.install(|| Renderer::default().render(world, camera, settings, &mut film));
+    pool.install(|| Renderer::default().render(world, camera, settings, &mut film)).unwrap();
     film
 }
 

@@ -18,6 +18,9 @@ use num_bigint::BigInt;
 use num_rational::BigRational;
 use num_traits::{Signed, Zero};
 
+/// Of a batch that fails.
+const MODE: &str = "nothing changed the floating point mode";
+
 /// An owned mesh.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Mesh {
@@ -45,14 +48,14 @@ impl Mesh {
 /// The closest hit of every ray.
 pub(crate) fn closest(accel: &AnyAccel, prims: &Triangles<'_>, rays: &[Ray], level: SimdLevel) -> Vec<Option<Hit>> {
     let mut hits = vec![None; rays.len()];
-    accel.closest_hits(prims, rays, 1, level, &mut hits);
+    accel.closest_hits(prims, rays, 1, level, &mut hits).expect(MODE);
     hits
 }
 
 /// Whether every ray is blocked.
 pub(crate) fn occluded(accel: &AnyAccel, prims: &Triangles<'_>, rays: &[Ray], level: SimdLevel) -> Vec<bool> {
     let mut blocked = vec![false; rays.len()];
-    accel.blocked(prims, rays, 1, level, &mut blocked);
+    accel.blocked(prims, rays, 1, level, &mut blocked).expect(MODE);
     blocked
 }
 
@@ -67,8 +70,8 @@ pub(crate) fn in_packets(
     let (mut start, mut len) = (0, 2);
     while start < rays.len() {
         let end = rays.len().min(start + len);
-        accel.closest_hits(prims, &rays[start..end], len, level, &mut hits[start..end]);
-        accel.blocked(prims, &rays[start..end], len, level, &mut blocked[start..end]);
+        accel.closest_hits(prims, &rays[start..end], len, level, &mut hits[start..end]).expect(MODE);
+        accel.blocked(prims, &rays[start..end], len, level, &mut blocked[start..end]).expect(MODE);
         start = end;
         len = if len == PACKET { 2 } else { len + 1 };
     }

@@ -123,7 +123,7 @@ impl<'a> Shots<'a> {
         };
         let _span = tracing::info_span!("render", frame = slot.frame).entered();
         let Self { renderer, settings, .. } = self;
-        let rays = settings.pool.install(|| renderer.render(&world, &view, &how, &mut slot.film));
+        let rays = settings.pool.install(|| renderer.render(&world, &view, &how, &mut slot.film))?;
         stages.frame(times, traced.elapsed(), start.elapsed(), rays);
         Ok(())
     }
