@@ -2,7 +2,7 @@
 //!
 //! A [`Report`] holds rows of [`Table`]s, [`Check`]s and [`Plot`]s; [`Report::write`] puts them into a folder as JSON, Markdown and SVG.
 //! [`structures`] measures every acceleration structure on scenes and on meshes of growing size; [`papers`] puts the tables of three
-//! papers beside ours.
+//! papers beside ours. [`reference`] holds the right answers that errors are measured by.
 
 pub mod baseline;
 mod check;
@@ -18,6 +18,7 @@ mod plot;
 mod random;
 mod rays;
 mod record;
+pub mod reference;
 pub mod structures;
 mod subject;
 mod table;
