@@ -6,6 +6,7 @@
 
 pub mod baseline;
 mod check;
+pub mod closed;
 mod date;
 mod error;
 mod machine;

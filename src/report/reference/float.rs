@@ -82,7 +82,7 @@ mod tests {
             assert!(u.low <= 0.25 && 0.25 <= u.high && v.low <= 0.5 && 0.5 <= v.high);
             assert_eq!(at(3.0, 3.0, d), Found::Miss);
             assert_eq!(at(2.0, 2.0, d), Found::Doubt);
-            assert_eq!(at(1.0, 1.0, Vec3::X), Found::Doubt);
+            assert_eq!(at(1.0, 1.0, Vec3::X), Found::Miss);
         }
     }
 }
