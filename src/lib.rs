@@ -16,6 +16,7 @@ extern crate self as kinora;
 
 pub mod accel;
 pub mod anim;
+pub mod collide;
 pub mod dynamics;
 mod error;
 pub mod geom;

@@ -13,11 +13,12 @@ const MAY_IMPORT: &[(&str, &[&str])] = &[
     ("anim", &["scene", "simd"]),
     ("accel", &["simd"]),
     ("world", &["accel", "anim", "scene", "simd"]),
+    ("collide", &["world", "accel", "simd"]),
     ("dynamics", &["world", "anim", "accel", "scene", "simd"]),
     ("render", &["world", "scene", "anim", "accel", "simd"]),
     ("output", &["render", "dynamics", "world", "anim", "scene", "simd"]),
-    ("report", &["output", "render", "dynamics", "world", "anim", "accel", "scene", "simd"]),
-    ("player", &["output", "render", "dynamics", "world", "anim", "accel", "scene", "simd"]),
+    ("report", &["collide", "output", "render", "dynamics", "world", "anim", "accel", "scene", "simd"]),
+    ("player", &["collide", "output", "render", "dynamics", "world", "anim", "accel", "scene", "simd"]),
 ];
 
 /// A word that names a foreign vocabulary, and the folders that may speak it.

@@ -16,7 +16,11 @@
 mod estimate;
 mod hit;
 mod int;
+mod measure;
+mod ratio;
 mod volumes;
 
 pub use estimate::{BOUND, Quotients};
 pub use hit::{RayRange, TriangleHit};
+pub use measure::{area, volume};
+pub use ratio::Ratio;

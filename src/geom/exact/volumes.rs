@@ -9,13 +9,13 @@ use super::{
 
 /// `value = mantissa * 2^exponent`; the exponent of 0 is the largest.
 #[derive(Clone, Copy)]
-struct Scaled {
-    mantissa: i32,
-    exponent: i32,
+pub(super) struct Scaled {
+    pub(super) mantissa: i32,
+    pub(super) exponent: i32,
 }
 
 impl Scaled {
-    fn new(value: f32) -> Self {
+    pub(super) fn new(value: f32) -> Self {
         let bits = value.to_bits();
         let biased = ((bits >> 23) & 0xff).cast_signed();
         let fraction = (bits & 0x007f_ffff).cast_signed();
@@ -32,7 +32,7 @@ impl Scaled {
     }
 
     /// `value / 2^exponent`, an integer.
-    fn to_int(self, exponent: i32) -> Int {
+    pub(super) fn to_int(self, exponent: i32) -> Int {
         if self.mantissa == 0 {
             Int::ZERO
         } else {
@@ -42,27 +42,27 @@ impl Scaled {
 }
 
 /// The least exponent among `points`' coordinates; 0 when all are 0.
-fn least_exponent(points: &[Vec3]) -> i32 {
+pub(super) fn least_exponent(points: &[Vec3]) -> i32 {
     let least = points.iter().flat_map(Vec3::to_array).map(|c| Scaled::new(c).exponent).min();
     least.filter(|&e| e != i32::MAX).unwrap_or(0)
 }
 
-type Int3 = [Int; 3];
+pub(super) type Int3 = [Int; 3];
 
-fn to_ints(point: Vec3, exponent: i32) -> Int3 {
+pub(super) fn to_ints(point: Vec3, exponent: i32) -> Int3 {
     point.to_array().map(|c| Scaled::new(c).to_int(exponent))
 }
 
-fn sub(a: &Int3, b: &Int3) -> Int3 {
+pub(super) fn sub(a: &Int3, b: &Int3) -> Int3 {
     [a[0].sub(&b[0]), a[1].sub(&b[1]), a[2].sub(&b[2])]
 }
 
-fn cross(a: &Int3, b: &Int3) -> Int3 {
+pub(super) fn cross(a: &Int3, b: &Int3) -> Int3 {
     let minor = |i: usize, j: usize| a[i].mul(&b[j]).sub(&a[j].mul(&b[i]));
     [minor(1, 2), minor(2, 0), minor(0, 1)]
 }
 
-fn dot(a: &Int3, b: &Int3) -> Int {
+pub(super) fn dot(a: &Int3, b: &Int3) -> Int {
     a[0].mul(&b[0]).add(&a[1].mul(&b[1])).add(&a[2].mul(&b[2]))
 }
 

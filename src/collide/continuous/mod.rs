@@ -1,0 +1,101 @@
+//! Continuous detection: when a moving vertex meets a moving face, or a moving edge another edge.
+//!
+//! All corners move along straight lines while t goes from 0 to 1. The vector F(t, u, v) from a point of the one to a point of the other
+//! is affine in each of its parameters, so its values over a cell of parameters lie in the hull of its eight values at the cell's corners.
+//! Cells whose hull cannot hold 0 are dropped, with every rounding accounted for; the others shrink and split, the earliest first, until
+//! the distance at a cell's start is within the tolerance. So no contact is missed, and none is reported late.
+//!
+//! # Source
+//! Wang, Ferguson, Schneider, Jiang, Attene, Panozzo, "A Large-Scale Benchmark and an Inclusion-Based Algorithm for Continuous Collision
+//! Detection", 2021, for the inclusion by corners and the order by time. Added here: hulls are tested along the directions that the
+//! derivatives give besides the axes, and the hull along a direction cuts the cell (as Sederberg and Nishita's "Curve intersection using
+//! Bézier clipping", 1990, cuts a parameter), which converges quadratically where the contact is simple; a face is mapped
+//! from a square, so that faces and edges are one case; and the search ends by the distance reached, not by the cell's size.
+
+mod cell;
+mod map;
+
+use std::collections::BinaryHeap;
+
+use glam::DVec3;
+
+use cell::{Cell, Fate};
+use map::Map;
+
+/// Continuous detection with its settings.
+///
+/// Lengths are in the units of the coordinates.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Continuous {
+    /// A contact may be reported where the distance comes within `min_separation + tolerance`. Where `tolerance` is less than rounding
+    /// allows, some 2^-47 of the distances between the corners, that takes its place.
+    pub tolerance: f64,
+    /// Distances up to this one count as contact.
+    pub min_separation: f64,
+    /// Cells looked at before the search gives up and reports the earliest time that is still open. Each takes a fraction of a microsecond.
+    pub max_cells: u32,
+}
+
+impl Default for Continuous {
+    fn default() -> Self {
+        Self { tolerance: 1e-9, min_separation: 0.0, max_cells: 1 << 14 }
+    }
+}
+
+/// A contact, or what cannot be told from one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Impact {
+    /// Not after the first contact; in [0, 1].
+    pub time: f64,
+    /// At `time`, the two come at least this near: at most `min_separation + tolerance` unless the search gave up or rounding hid
+    /// the rest.
+    pub gap: f64,
+    /// Where: weights of the face's second and third corner, or how far along the first and the second edge.
+    pub place: [f64; 2],
+}
+
+impl Continuous {
+    /// When a vertex meets a closed face, while t goes from 0 to 1: `start` and `end` are `[vertex, a, b, c]`.
+    ///
+    /// `None` only if they surely do not come within `min_separation` of each other. Degenerate faces are legal. Corners that
+    /// are not finite meet nothing. Cost: 0.1 to 0.5 µs where the motions lie apart, some 3 µs for a simple contact; many cells where
+    /// the two slide along each other closer than rounding can tell. Allocates only when a cell must be split.
+    pub fn vertex_face(&self, start: &[DVec3; 4], end: &[DVec3; 4]) -> Option<Impact> {
+        let impact = self.earliest(Map::vertex_face(start, end)?)?;
+        let [s, r] = impact.place;
+        Some(Impact { place: [s * (1.0 - r), s * r], ..impact })
+    }
+
+    /// When a closed edge meets another, while t goes from 0 to 1: `start` and `end` are `[a0, a1, b0, b1]`, edges a0 a1 and b0 b1.
+    ///
+    /// As [`Continuous::vertex_face`].
+    pub fn edge_edge(&self, start: &[DVec3; 4], end: &[DVec3; 4]) -> Option<Impact> {
+        self.earliest(Map::edge_edge(start, end)?)
+    }
+
+    fn earliest(&self, map: Map) -> Option<Impact> {
+        let separation = map.scaled(self.min_separation.max(0.0));
+        let tolerance = map.scaled(self.tolerance.max(0.0));
+        if map.lie_apart(separation) {
+            return None;
+        }
+        let mut open = BinaryHeap::new();
+        let mut cell = Cell::ALL;
+        for _ in 0..self.max_cells {
+            match cell.work(&map, separation, tolerance) {
+                Fate::Empty => {}
+                Fate::Split(near, far) => {
+                    open.push(near);
+                    open.push(far);
+                }
+                // Another cell may begin earlier.
+                Fate::Reached(reached) if open.peek().is_none_or(|c: &Cell| c.begins() >= reached.begins()) => {
+                    return Some(reached.impact(&map));
+                }
+                Fate::Reached(reached) => open.push(reached),
+            }
+            cell = open.pop()?;
+        }
+        Some(cell.impact(&map))
+    }
+}
