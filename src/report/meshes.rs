@@ -10,7 +10,7 @@ use std::f64::consts::PI;
 
 use rayon::prelude::*;
 
-use super::{random::Random, subject::Subject};
+use super::{random::Random, rays::View, subject::Subject};
 use crate::{
     geom::Aabb,
     glam::{DVec3, Vec3},
@@ -44,6 +44,13 @@ pub fn dented_sphere(triangles: usize) -> Subject {
     Subject::still(format!("sphere-{}", short(indices.len())), positions, indices)
 }
 
+/// A [`dented_sphere`] seen from its middle: rays cross empty space before they come upon small triangles, as in a room.
+pub(super) fn cave(triangles: usize) -> Subject {
+    let sphere = dented_sphere(triangles);
+    let view = View { eye: DVec3::ZERO, at: DVec3::X, up: DVec3::Y, half: 0.5 };
+    Subject { name: sphere.name.replace("sphere", "cave"), view: Some(view), ..sphere }
+}
+
 /// Triangles without order in the unit cube, each about as large as the distance to the next: the worst that structures meet.
 pub fn soup(triangles: usize) -> Subject {
     let count = triangles.clamp(1, MAX_TRIANGLES);
@@ -63,7 +70,7 @@ pub fn soup(triangles: usize) -> Subject {
 /// The corners of a box's faces: corner `c` is at the upper end of axis `i` when bit `i` is set.
 const FACES: [[u32; 4]; 6] = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
 
-/// So many upright boxes of twelve triangles on a floor, which is one of them: a room as made by hand.
+/// So many upright boxes of twelve triangles, the first of which is the room around the others, seen from a corner of it.
 pub fn boxes(count: usize) -> Subject {
     let count = count.clamp(1, MAX_TRIANGLES / 12);
     let corners = |i: usize| {
@@ -71,7 +78,7 @@ pub fn boxes(count: usize) -> Subject {
         let mut number = |low: f64, high: f64| low + (high - low) * random.unit();
         let half = DVec3::new(number(0.02, 0.08), number(0.02, 0.3), number(0.02, 0.08));
         let (center, half) = match i {
-            0 => (DVec3::new(0.0, -0.05, 0.0), DVec3::new(1.0, 0.05, 1.0)),
+            0 => (DVec3::new(0.0, 0.5, 0.0), DVec3::new(1.0, 0.5, 1.0)),
             _ => (DVec3::new(number(-0.9, 0.9), half.y, number(-0.9, 0.9)), half),
         };
         let side = |bit: usize, c: usize| if c >> bit & 1 == 1 { 1.0 } else { -1.0 };
@@ -82,7 +89,10 @@ pub fn boxes(count: usize) -> Subject {
         FACES.into_iter().flat_map(halves).map(move |t| t.map(|c| 8 * i + c))
     };
     let positions = (0..count).flat_map(corners).collect();
-    Subject::still(format!("boxes-{count}"), positions, (0..count as u32).flat_map(faces).collect())
+    let mut subject = Subject::still(format!("boxes-{count}"), positions, (0..count as u32).flat_map(faces).collect());
+    let (eye, at) = (DVec3::new(-0.9, 0.7, 0.9), DVec3::new(0.0, 0.3, 0.0));
+    subject.view = Some(View { eye, at, up: DVec3::Y, half: 0.5 });
+    subject
 }
 
 /// The vertices moved by a standing wave of a thousandth of their box's diagonal.
@@ -128,6 +138,7 @@ mod tests {
         assert_eq!(dented_sphere(1000).name, "sphere-968");
         assert_eq!(soup(10_000).name, "soup-10k");
         assert_eq!(soup(0).indices.len(), 1);
+        assert_eq!(cave(1000).name, "cave-968");
         assert_eq!((boxes(41).indices.len(), boxes(41).positions.len()), (492, 328));
     }
 }

@@ -12,6 +12,8 @@ pub(super) enum Source<'a> {
     Given(&'a Subject),
     /// A dented ball of about so many triangles.
     Sphere(usize),
+    /// As `Sphere`, seen from inside: a room.
+    Cave(usize),
     /// So many triangles without order.
     Soup(usize),
     /// So many boxes of twelve triangles.
@@ -40,6 +42,7 @@ impl Source<'_> {
         Ok(match *self {
             Self::Given(subject) => subject.clone(),
             Self::Sphere(triangles) => meshes::dented_sphere(triangles),
+            Self::Cave(triangles) => meshes::cave(triangles),
             Self::Soup(triangles) => meshes::soup(triangles),
             Self::Boxes(count) => meshes::boxes(count),
             Self::Spd(kind, size, triangles) => {
