@@ -135,6 +135,37 @@ fn counts_are_the_same_in_every_run_and_a_worse_count_fails_the_check() {
 }
 
 #[test]
+fn accuracy_sets_speed_against_error_and_conservative_points_err_never() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let (mesh, out) = (mesh(dir.path()), dir.path().join("out"));
+    let mut command = kinora();
+    command.args(["report", "accuracy", &mesh, "--quick", "--check", "--threads", "1", "--output"]).arg(&out);
+    command.assert().success();
+    let report: Value = serde_json::from_slice(&fs::read(out.join("accuracy.json")).expect("written")).expect("JSON");
+    let rows = report["rows"].as_array().expect("rows");
+    let of = |table: &'static str| rows.iter().filter(move |r| r["table"] == table);
+    for name in structures() {
+        let mine: Vec<&Value> = of("rays").filter(|r| r["structure"] == name && r["cast"] == "single").collect();
+        for class in ["primary", "shadow", "diffuse", "edges"] {
+            let exact = mine.iter().find(|r| r["rays"] == class && r["precision"] == "exact");
+            let row = exact.unwrap_or_else(|| panic!("{name}: {class}"));
+            assert_eq!(row["kind"], "conservative");
+            assert!(row["ns_per_ray"].as_f64() > Some(0.0) && row["count"].as_u64() >= Some(16), "{row}");
+            for error in ["false_misses", "false_hits", "wrong_triangles"] {
+                assert_eq!(row[error], 0, "{row}");
+                assert!(row[format!("{error}_below")].as_f64() > Some(0.0), "{row}");
+            }
+            assert!(class == "shadow" || row["t_error_max"].as_f64() <= Some(1.0), "{row}");
+        }
+        assert!(mine.iter().any(|r| r["kind"] == "lossy"), "{name}");
+    }
+    let best: Vec<&Value> = of("pareto").filter(|r| r["non_dominated"] == true).collect();
+    assert!(!best.is_empty() && best.len() < of("pareto").count());
+    assert!(of("bounds").count() > 1);
+    assert!(fs::read_to_string(out.join("accuracy.md")).expect("written").contains("lossy"));
+}
+
+#[test]
 fn what_cannot_be_used_ends_in_exit_2_with_a_reason_and_no_files() {
     let dir = tempfile::tempdir().expect("a folder");
     let mesh = mesh(dir.path());
@@ -146,7 +177,6 @@ fn what_cannot_be_used_ends_in_exit_2_with_a_reason_and_no_files() {
         assert!(!out.join("structures.json").exists());
     };
     refuses(&["frames"], "possible values: ");
-    refuses(&["accuracy"], "structures");
     refuses(&["structures", "missing.glb"], "missing.glb");
     refuses(&["structures", &mesh, "--baseline", "missing.json"], "missing.json: cannot read");
     refuses(&["structures", &mesh, "--baseline", &mesh], "no report");

@@ -45,6 +45,7 @@ fn ids(prims: &Triangles<'_>) -> impl Iterator<Item = PrimId> + use<> {
 
 impl Accel for List {
     const NAME: &'static str = "list";
+    const NODE_FORMAT: &'static str = "none";
     type Config = ListConfig;
     type RayState = ();
 

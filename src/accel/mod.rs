@@ -158,6 +158,8 @@ pub trait Accel: Sized + Clone + Send + Sync + std::fmt::Debug + 'static {
     type Config: AccelConfig;
     /// False when every refit asks for a rebuild.
     const REFITS: bool = true;
+    /// What its nodes say about what is below them, for reports.
+    const NODE_FORMAT: &'static str = "full boxes";
     /// What a walk leaves for rays that start where it ended; `()` where nothing is gained.
     type RayState: Clone + Default + std::fmt::Debug;
 

@@ -128,6 +128,13 @@ macro_rules! register_accels {
                 }
             }
 
+            /// As [`Accel::NODE_FORMAT`].
+            pub fn node_format(&self) -> &'static str {
+                match self {
+                    $(Self::$kind(_) => <$ty>::NODE_FORMAT,)*
+                }
+            }
+
             /// As [`Accel::refit_into`]; an `out` of another kind is replaced by a copy first.
             pub fn refit_into(&self, out: &mut Self, prims: &Triangles<'_>) -> Refit {
                 if self.kind() != out.kind() {

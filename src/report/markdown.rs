@@ -9,6 +9,9 @@ impl Report {
     pub fn markdown(&self) -> String {
         let mut out = format!("# kinora report {}\n\n", self.kind.name());
         out += &self.preamble();
+        for paragraph in &self.summary {
+            let _ = write!(out, "\n{paragraph}\n");
+        }
         out += &self.bounds();
         for table in &self.tables {
             out += &format_table(table);
@@ -54,7 +57,7 @@ fn format_table(table: &Table) -> String {
     let shown: Vec<usize> = (0..table.columns.len())
         .filter(|&i| table.columns[i].role == Role::Id || table.rows.iter().any(|r| r[i] != Cell::Absent))
         .collect();
-    let is_text = |i: usize| table.rows.iter().all(|r| matches!(r[i], Cell::Text(_) | Cell::Absent));
+    let is_text = |i: usize| table.rows.iter().all(|r| matches!(r[i], Cell::Text(_) | Cell::Flag(_) | Cell::Absent));
     let line = |cells: &mut dyn Iterator<Item = String>| format!("| {} |\n", cells.collect::<Vec<_>>().join(" | "));
     out += "\n";
     out += &line(&mut shown.iter().map(|&i| table.columns[i].head.to_owned()));
@@ -71,6 +74,7 @@ fn cell(cell: &Cell, digits: usize) -> String {
         Cell::Text(text) => escaped(text),
         Cell::Count(n) => grouped(*n),
         Cell::Number(x) => number(*x, digits),
+        Cell::Flag(is) => if *is { "yes" } else { "no" }.to_owned(),
         Cell::Absent => "-".to_owned(),
     }
 }

@@ -2,8 +2,9 @@
 //!
 //! A [`Report`] holds rows of [`Table`]s, [`Check`]s and [`Plot`]s; [`Report::write`] puts them into a folder as JSON, Markdown and SVG.
 //! [`structures`] measures every acceleration structure on scenes and on meshes of growing size; [`papers`] puts the tables of three
-//! papers beside ours. [`reference`] holds the right answers that errors are measured by.
+//! papers beside ours; [`accuracy`] sets speed against error. [`reference`] holds the right answers that errors are measured by.
 
+pub mod accuracy;
 pub mod baseline;
 mod check;
 pub mod closed;
@@ -28,7 +29,7 @@ pub use check::{Bound, Check};
 pub use error::ReportError;
 pub use machine::Machine;
 pub use monitor::{Monitor, Quiet};
-pub use plot::{Bars, Chart, Line, Lines, Plot};
+pub use plot::{Bars, Chart, Dot, Line, Lines, Plot, Scatter};
 pub use rays::{RayClass, View};
 pub use record::{Kind, Report, SCHEMA, Settings};
 pub use subject::Subject;

@@ -35,6 +35,10 @@ const COLORS: [RGBColor; 10] = [
 const FRAME: RGBColor = RGBColor(70, 70, 70);
 const GRID: RGBColor = RGBColor(222, 222, 222);
 
+/// Colour of points that another one beats, and its number.
+const DOMINATED: RGBColor = RGBColor(185, 185, 185);
+const GREY: usize = usize::MAX;
+
 /// Values of one name.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Line {
@@ -77,6 +81,30 @@ pub struct Bars {
     pub lines: Vec<Line>,
 }
 
+/// A point of a [`Scatter`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct Dot {
+    /// Its name, written beside it when it is among the best.
+    pub name: String,
+    /// Where it is.
+    pub at: (f64, f64),
+    /// True for a point in colour with its name, false for a grey one without.
+    pub is_best: bool,
+    /// Number of its mark, as in [`Line`].
+    pub mark: usize,
+}
+
+/// Points over two logarithmic axes; an upward value of 0 is drawn on the lower edge.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Scatter {
+    /// What runs to the right, with its unit.
+    pub x: String,
+    /// What runs upward, with its unit.
+    pub y: String,
+    /// The points.
+    pub dots: Vec<Dot>,
+}
+
 /// What a plot shows.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Chart {
@@ -84,6 +112,8 @@ pub enum Chart {
     Lines(Lines),
     /// Values side by side.
     Bars(Bars),
+    /// Cost against error.
+    Scatter(Scatter),
 }
 
 /// A plot, drawn when it is asked for.
@@ -124,6 +154,7 @@ impl Plot {
             match &self.chart {
                 Chart::Lines(lines) => draw_lines(&root, &self.title, lines),
                 Chart::Bars(bars) => draw_bars(&root, &self.title, bars),
+                Chart::Scatter(scatter) => draw_scatter(&root, &self.title, scatter),
             }
             .and_then(|()| root.present())
         };
@@ -195,6 +226,60 @@ fn draw_bars(root: &Area<'_>, title: &str, bars: &Bars) -> Result<(), Failed> {
     Ok(())
 }
 
+fn draw_scatter(root: &Area<'_>, title: &str, scatter: &Scatter) -> Result<(), Failed> {
+    // What is nothing at all stands a decade below the least that is something.
+    let above = scatter.dots.iter().map(|d| d.at.1).filter(|&y| drawable(y)).fold(f64::INFINITY, f64::min);
+    let floor = if above.is_finite() { above / 10.0 } else { 1.0 };
+    let points = |best: bool| {
+        let of_kind = scatter.dots.iter().filter(move |d| d.is_best == best && drawable(d.at.0) && d.at.1.is_finite());
+        of_kind.map(move |d| (d, (d.at.0, if d.at.1 > 0.0 { d.at.1 } else { floor })))
+    };
+    let all = [Line::new(0, "", points(true).chain(points(false)).map(|p| p.1).collect())];
+    let [x, y] = [decades(&all, |p| p.0), decades(&all, |p| p.1)];
+    let plot = begin(root, title, &scatter_legend())?;
+    let mut chart = ChartBuilder::on(&plot)
+        .margin(8)
+        .x_label_area_size(BELOW)
+        .y_label_area_size(LEFT)
+        .build_cartesian_2d((x.0..x.1).log_scale(), (y.0..y.1).log_scale())?;
+    chart
+        .configure_mesh()
+        .x_desc(&scatter.x)
+        .y_desc(&scatter.y)
+        .x_label_formatter(&|x| short(*x))
+        .y_label_formatter(&|y| if *y <= floor * 1.01 { "0".to_owned() } else { short(*y) })
+        .bold_line_style(GRID)
+        .light_line_style(TRANSPARENT)
+        .axis_style(FRAME)
+        .label_style(("sans-serif", 13))
+        .draw()?;
+    let origin = plot.get_base_pixel();
+    for (dot, at) in points(false).chain(points(true)) {
+        let (px, py) = chart.backend_coord(&at);
+        let at = (px - origin.0, py - origin.1);
+        draw_mark_in(&plot, dot.mark, if dot.is_best { COLORS[dot.mark % 2] } else { DOMINATED }, at)?;
+    }
+    // Names stand apart where points are close together.
+    let mut taken: Vec<(i32, i32)> = Vec::new();
+    for (dot, at) in points(true) {
+        let (px, py) = chart.backend_coord(&at);
+        let (tx, mut ty) = (px - origin.0 + 8, py - origin.1);
+        while taken.iter().any(|t| (t.0 - tx).abs() < 200 && (t.1 - ty).abs() < 13) {
+            ty -= 13;
+        }
+        taken.push((tx, ty));
+        let style = ("sans-serif", 12).into_font().color(&FRAME).pos(Pos::new(HPos::Left, VPos::Center));
+        plot.draw(&Text::new(dot.name.clone(), (tx, ty), style))?;
+    }
+    Ok(())
+}
+
+/// What the marks of a [`Scatter`] mean.
+fn scatter_legend() -> [Line; 3] {
+    let line = |name: &str, color: usize, mark: usize| Line { name: name.into(), points: Vec::new(), color, mark };
+    [line("conservative", 0, 0), line("lossy", 1, 1), line("grey: dominated", GREY, 0)]
+}
+
 /// Fills the ground, writes the title and the legend; the area left for the axes.
 fn begin<'a>(root: &Area<'a>, title: &str, lines: &[Line]) -> Result<Area<'a>, Failed> {
     root.fill(&WHITE)?;
@@ -226,15 +311,19 @@ fn mark<X: Ranged<ValueType = f64>>(
 }
 
 fn draw_mark(area: &Area<'_>, line: &Line, at: (i32, i32)) -> Result<(), Failed> {
-    match line.mark % 3 {
-        0 => area.draw(&Circle::new(at, 4, color(line).filled())),
-        1 => area.draw(&TriangleMarker::new(at, 6, color(line).filled())),
-        _ => area.draw(&Cross::new(at, 4, color(line).stroke_width(2))),
+    draw_mark_in(area, line.mark, color(line), at)
+}
+
+fn draw_mark_in(area: &Area<'_>, mark: usize, color: RGBColor, at: (i32, i32)) -> Result<(), Failed> {
+    match mark % 3 {
+        0 => area.draw(&Circle::new(at, 4, color.filled())),
+        1 => area.draw(&TriangleMarker::new(at, 6, color.filled())),
+        _ => area.draw(&Cross::new(at, 4, color.stroke_width(2))),
     }
 }
 
 fn color(line: &Line) -> RGBColor {
-    COLORS[line.color % COLORS.len()]
+    if line.color == GREY { DOMINATED } else { COLORS[line.color % COLORS.len()] }
 }
 
 fn drawable(x: f64) -> bool {
@@ -301,6 +390,18 @@ mod tests {
             assert_eq!(svg.matches("<circle").count(), 30);
             assert!(!svg.contains("NaN") && !svg.contains("inf"));
         }
+    }
+
+    #[test]
+    fn points_worth_their_cost_have_names_and_the_others_are_grey() {
+        let dot = |name: &str, at, is_best| Dot { name: name.into(), at, is_best, mark: 0 };
+        let dots =
+            vec![dot("best", (10.0, 0.0), true), dot("beaten", (30.0, 5.0), false), dot("cheap", (9.0, 70.0), true)];
+        let svg = Plot::new("p", "t", Chart::Scatter(Scatter { x: "ns".into(), y: "u".into(), dots })).svg().unwrap();
+        assert!(svg.contains("best") && svg.contains("cheap") && !svg.contains("beaten"));
+        // The point, and its line in the legend.
+        assert_eq!(svg.matches("#B9B9B9").count(), 2);
+        assert!(!svg.contains("NaN") && !svg.contains("inf"));
     }
 
     #[test]

@@ -16,17 +16,20 @@ pub enum Kind {
     Papers,
     /// Every acceleration structure on every scene.
     Structures,
+    /// Speed against error.
+    Accuracy,
 }
 
 impl Kind {
     /// The reports that exist.
-    pub const ALL: [Self; 2] = [Self::Papers, Self::Structures];
+    pub const ALL: [Self; 3] = [Self::Papers, Self::Structures, Self::Accuracy];
 
     /// Name on the command line and of the files.
     pub fn name(self) -> &'static str {
         match self {
             Self::Papers => "papers",
             Self::Structures => "structures",
+            Self::Accuracy => "accuracy",
         }
     }
 }
@@ -59,6 +62,8 @@ pub struct Report {
     pub machine: Machine,
     /// The day, `YYYY-MM-DD` in UTC.
     pub date: String,
+    /// What a reader learns first, a paragraph (or list, or table) of Markdown each.
+    pub summary: Vec<String>,
     /// The rows.
     pub tables: Vec<Table>,
     /// Bounds and targets.
@@ -77,7 +82,16 @@ impl Report {
     /// A report of today on this machine, still without rows.
     pub fn new(kind: Kind, settings: Settings) -> Self {
         let (machine, date) = (Machine::this(), date::today());
-        Self { kind, settings, machine, date, tables: Vec::new(), checks: Vec::new(), plots: Vec::new() }
+        Self {
+            kind,
+            settings,
+            machine,
+            date,
+            summary: Vec::new(),
+            tables: Vec::new(),
+            checks: Vec::new(),
+            plots: Vec::new(),
+        }
     }
 
     /// Bounds that were missed.

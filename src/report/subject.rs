@@ -60,10 +60,17 @@ impl Subject {
 
 /// All triangles of a scene in one list, `after_s` seconds after the middle of a clip.
 fn posed(scene: &Scene, clip: Option<usize>, after_s: f64) -> (Vec<Vec3>, Vec<[u32; 3]>) {
-    let active = clip.map(|i| {
-        let id = ClipId(u32::try_from(i).unwrap_or(u32::MAX));
-        ActiveClip { clip: id, time_s: scene.clips[i].duration_s / 2.0 + after_s }
-    });
+    posed_at(scene, clip.map(|i| middle(scene, i, after_s)))
+}
+
+/// `after_s` seconds after the middle of a clip.
+pub(super) fn middle(scene: &Scene, clip: usize, after_s: f64) -> ActiveClip {
+    let id = ClipId(u32::try_from(clip).unwrap_or(u32::MAX));
+    ActiveClip { clip: id, time_s: scene.clips[clip].duration_s / 2.0 + after_s }
+}
+
+/// All triangles of a scene in one list, at a time of a clip or in the rest pose.
+pub(super) fn posed_at(scene: &Scene, active: Option<ActiveClip>) -> (Vec<Vec3>, Vec<[u32; 3]>) {
     let mut pose = Pose::rest(scene);
     pose.evaluate(scene, active.as_slice(), &DAffine3::IDENTITY);
     let (mut positions, mut indices) = (Vec::new(), Vec::new());

@@ -9,6 +9,8 @@ pub enum Cell {
     Count(u64),
     /// A measured or derived number.
     Number(f64),
+    /// Yes or no.
+    Flag(bool),
     /// Nothing to say here.
     Absent,
 }
@@ -19,7 +21,7 @@ impl Cell {
         match self {
             Self::Count(n) => Some(*n as f64),
             Self::Number(x) => Some(*x),
-            Self::Text(_) | Self::Absent => None,
+            Self::Text(_) | Self::Flag(_) | Self::Absent => None,
         }
     }
 
@@ -29,6 +31,7 @@ impl Cell {
             Self::Count(n) => (*n).into(),
             // JSON has no infinities; a number that is none becomes null.
             Self::Number(x) => (*x).into(),
+            Self::Flag(is) => (*is).into(),
             Self::Absent => Value::Null,
         }
     }
@@ -61,6 +64,12 @@ impl From<usize> for Cell {
 impl From<f64> for Cell {
     fn from(x: f64) -> Self {
         Self::Number(x)
+    }
+}
+
+impl From<bool> for Cell {
+    fn from(is: bool) -> Self {
+        Self::Flag(is)
     }
 }
 

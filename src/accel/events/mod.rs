@@ -148,6 +148,7 @@ impl Events {
 
 impl Accel for Events {
     const NAME: &'static str = "events";
+    const NODE_FORMAT: &'static str = "sorted lists";
     type Config = EventsConfig;
     type RayState = EventState;
 

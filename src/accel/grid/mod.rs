@@ -270,6 +270,7 @@ impl Grid {
 
 impl Accel for Grid {
     const NAME: &'static str = "grid";
+    const NODE_FORMAT: &'static str = "cells";
     type Config = GridConfig;
     const REFITS: bool = false;
     type RayState = ();

@@ -112,6 +112,7 @@ impl Grug {
 
 impl Accel for Grug {
     const NAME: &'static str = "grug";
+    const NODE_FORMAT: &'static str = "cells over split planes";
     type Config = GrugConfig;
     const REFITS: bool = false;
     type RayState = ();

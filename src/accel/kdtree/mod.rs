@@ -219,6 +219,7 @@ pub struct KdTree {
 
 impl Accel for KdTree {
     const NAME: &'static str = "kdtree";
+    const NODE_FORMAT: &'static str = "split planes";
     type Config = KdConfig;
     const REFITS: bool = false;
     type RayState = ();

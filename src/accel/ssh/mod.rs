@@ -235,6 +235,7 @@ fn sweep<L: Leaves>(
 
 impl Accel for Ssh {
     const NAME: &'static str = "ssh";
+    const NODE_FORMAT: &'static str = "slabs";
     type Config = SshConfig;
     type RayState = ();
 

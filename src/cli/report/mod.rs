@@ -5,6 +5,7 @@ mod monitor;
 use std::{
     fmt::Write,
     path::{Path, PathBuf},
+    sync::Arc,
 };
 
 use clap::Args;
@@ -13,6 +14,7 @@ use kinora::{
     output::{Unfinished, atomic},
     report::{
         Kind, Report, ReportError, Subject,
+        accuracy::{self, Source},
         baseline::{Baseline, Changes},
         papers, structures,
     },
@@ -28,7 +30,7 @@ pub(crate) struct ReportArgs {
     #[arg(value_name = "KIND", value_parser = values::report())]
     kind: Kind,
     /// Scenes or meshes (.gltf, .glb, builtin:NAME, .tris, .ply, .obj, .stl). Without any, `structures` takes the built-in scenes, generated
-    /// meshes and growth over the number of triangles. For `papers` they take the places of the papers' models; without any, models are
+    /// meshes and growth over the number of triangles; `accuracy` takes the built-in scenes and closed meshes. For `papers` they take the places of the papers' models; without any, models are
     /// looked for in ../shared/assets/meshes, and generated scenes stand in for the rest
     #[arg(value_name = "SCENE")]
     scenes: Vec<String>,
@@ -55,11 +57,11 @@ pub(crate) fn run(args: &ReportArgs, settings: &Settings) -> Result<(), CliError
     let baseline = args.baseline.as_deref().map(|file| Baseline::read(file, args.kind)).transpose()?;
     atomic::prepare(&args.output.join(format!("{}.json", args.kind.name())))?;
     let scenes = if args.scenes.is_empty() { models_at_hand(args) } else { args.scenes.clone() };
-    let subjects = scenes.iter().map(|s| subject(s, &scenes, settings)).collect::<Result<Vec<_>, _>>()?;
+    let inputs = Inputs::read(args.kind, &scenes, settings)?;
     let unfinished = Unfinished::default();
     let signals = Signals::watch(&unfinished)?;
     let mut watching = Watching::new(&signals, settings.verbosity);
-    let made = settings.pool.install(|| measure(args, &subjects, settings, &mut watching));
+    let made = settings.pool.install(|| measure(args, &inputs, settings, &mut watching));
     watching.end();
     signals.check()?;
     let mut report = made?;
@@ -72,21 +74,43 @@ pub(crate) fn run(args: &ReportArgs, settings: &Settings) -> Result<(), CliError
     verdict(args, &report)
 }
 
+/// What is measured.
+enum Inputs {
+    Subjects(Vec<Subject>),
+    Sources(Vec<Source>),
+}
+
+impl Inputs {
+    fn read(kind: Kind, scenes: &[String], settings: &Settings) -> Result<Self, CliError> {
+        let subjects = || scenes.iter().map(|s| subject(s, scenes, settings)).collect::<Result<_, _>>();
+        let sources = || scenes.iter().map(|s| source(s, scenes, settings)).collect::<Result<_, _>>();
+        Ok(match kind {
+            Kind::Papers | Kind::Structures => Self::Subjects(subjects()?),
+            Kind::Accuracy => Self::Sources(sources()?),
+        })
+    }
+}
+
 fn measure(
     args: &ReportArgs,
-    subjects: &[Subject],
+    inputs: &Inputs,
     settings: &Settings,
     watching: &mut Watching<'_>,
 ) -> Result<Report, ReportError> {
-    match args.kind {
-        Kind::Papers => {
+    let asked = settings.accel.parse::<AccelSpec>().ok();
+    match inputs {
+        Inputs::Sources(sources) => {
+            let mut options = accuracy::Options { simd: settings.simd, ..accuracy::Options::new(args.quick) };
+            options.specs.extend(asked.filter(|spec| !options.specs.contains(spec)));
+            accuracy::report(sources, &options, watching)
+        }
+        Inputs::Subjects(subjects) if args.kind == Kind::Papers => {
             let options = papers::Options { quick: args.quick, simd: settings.simd };
             papers::report(subjects, options, watching)
         }
-        Kind::Structures => {
+        Inputs::Subjects(subjects) => {
             let mut options = structures::Options { simd: settings.simd, ..structures::Options::new(args.quick) };
-            let asked: Result<AccelSpec, _> = settings.accel.parse();
-            options.specs.extend(asked.ok().filter(|spec| !options.specs.contains(spec)));
+            options.specs.extend(asked.filter(|spec| !options.specs.contains(spec)));
             structures::report(subjects, &options, watching)
         }
     }
@@ -106,6 +130,13 @@ fn subject(file: &str, all: &[String], settings: &Settings) -> Result<Subject, C
     }
     let mut frames = geometry::read(&[file.to_owned()], settings)?;
     Ok(Subject::still(name, frames.positions.swap_remove(0), frames.indices))
+}
+
+fn source(file: &str, all: &[String], settings: &Settings) -> Result<Source, CliError> {
+    if geometry::is_mesh(file) {
+        return subject(file, all, settings).map(Source::mesh);
+    }
+    Ok(Source::scene(name(file, all), Arc::new(scene::load(Some(file), settings)?)))
 }
 
 /// The file's name without folders, unless another of `all` has the same.

@@ -1,7 +1,7 @@
 use super::{Counts, Stopwatch};
 use crate::{
     accel::{AnyAccel, AnyHit, Closest, Counter, PACKET, TravRay},
-    geom::{Hit, PrimId, Ray, Triangles},
+    geom::{Forms, Hit, InstanceId, PrimId, Ray, Triangles},
     glam::Vec3,
     simd::{Scalar, Simd, SimdLevel, Task, dispatch},
 };
@@ -28,6 +28,11 @@ impl Answer {
         hit.map_or(Self::MISS, |h| Self([h.prim.0, h.t.to_bits(), h.u.to_bits(), h.v.to_bits()]))
     }
 
+    /// A hit of `prim`.
+    pub(in crate::report) fn at(prim: PrimId, t: f32, [u, v]: [f32; 2]) -> Self {
+        Self([prim.0, t.to_bits(), u.to_bits(), v.to_bits()])
+    }
+
     #[inline(always)]
     fn blocked(blocked: bool) -> Self {
         if blocked { Self([0; 4]) } else { Self::MISS }
@@ -37,6 +42,13 @@ impl Answer {
     pub fn hit(self) -> Option<(PrimId, f32)> {
         let [prim, t, ..] = self.0;
         (self != Self::MISS).then(|| (PrimId(prim), f32::from_bits(t)))
+    }
+
+    /// All of a hit.
+    pub fn found(self) -> Option<Hit> {
+        let [prim, t, u, v] = self.0;
+        let [t, u, v] = [t, u, v].map(f32::from_bits);
+        (self != Self::MISS).then_some(Hit { t, u, v, prim: PrimId(prim), instance: InstanceId(0) })
     }
 }
 
@@ -49,6 +61,8 @@ pub struct Caster<'a> {
     pub prims: Triangles<'a>,
     /// Level of the kernels.
     pub simd: SimdLevel,
+    /// How rays are tested.
+    pub forms: Forms,
 }
 
 impl Caster<'_> {
@@ -116,9 +130,9 @@ impl<C: Counter> Task for Chunk<'_, C> {
 impl<C: Counter> Chunk<'_, C> {
     #[inline(always)]
     fn closest<S: Simd>(self) {
-        let Caster { accel, prims, .. } = self.caster;
+        let Caster { accel, prims, forms, .. } = self.caster;
         for (ray, out) in self.rays.iter().zip(self.out) {
-            let hit = TravRay::new(ray).and_then(|ray| {
+            let hit = TravRay::with_forms(ray, *forms).and_then(|ray| {
                 let mut best = Closest::new(&ray);
                 accel.closest::<S, _, _>(prims, &ray, &mut best, &AnyHit, self.count);
                 best.hit(&ray)
@@ -129,9 +143,9 @@ impl<C: Counter> Chunk<'_, C> {
 
     #[inline(always)]
     fn blocked<S: Simd>(self) {
-        let Caster { accel, prims, .. } = self.caster;
+        let Caster { accel, prims, forms, .. } = self.caster;
         for (ray, out) in self.rays.iter().zip(self.out) {
-            let ray = TravRay::new(ray);
+            let ray = TravRay::with_forms(ray, *forms);
             *out = Answer::blocked(ray.is_some_and(|ray| accel.occluded::<S, _, _>(prims, &ray, &AnyHit, self.count)));
         }
     }
@@ -139,14 +153,14 @@ impl<C: Counter> Chunk<'_, C> {
     /// Lanes whose ray is none keep a stand-in that is not active.
     #[inline(always)]
     fn packets<S: Simd>(self) {
-        let Caster { accel, prims, .. } = self.caster;
-        let Some(stand_in) = TravRay::new(&Ray::new(Vec3::ZERO, Vec3::X)) else { return };
+        let Caster { accel, prims, forms, .. } = self.caster;
+        let Some(stand_in) = TravRay::with_forms(&Ray::new(Vec3::ZERO, Vec3::X), *forms) else { return };
         let sinks = [AnyHit; PACKET];
         for (records, out) in self.rays.chunks(PACKET).zip(self.out.chunks_mut(PACKET)) {
             let mut rays = [stand_in; PACKET];
             let mut active = 0;
             for (i, record) in records.iter().enumerate() {
-                if let Some(ray) = TravRay::new(record) {
+                if let Some(ray) = TravRay::with_forms(record, *forms) {
                     rays[i] = ray;
                     active |= 1 << i;
                 }

@@ -7,7 +7,7 @@ use super::{
 };
 use crate::{
     accel::{AccelSpec, AccelStats, AnyAccel},
-    geom::Ray,
+    geom::{Forms, Ray},
     report::{
         Bound, Cell, Check, Column, Monitor, ReportError, Role, Subject, Table,
         measure::{Answer, Ask, Caster, Counts, Samples},
@@ -172,7 +172,7 @@ impl Pair {
     fn measure(subject: &Subject, setup: &Setup, rays: &[Ray], options: Options) -> Result<Self, ReportError> {
         let (mut bvh2, box_tree) = Half::build(subject, "bvh2", setup, options.quick)?;
         let (mut ssh, slab_tree) = Half::build(subject, "ssh", setup, options.quick)?;
-        let caster = |accel| Caster { accel, prims: subject.prims(), simd: options.simd };
+        let caster = |accel| Caster { accel, prims: subject.prims(), simd: options.simd, forms: Forms::EXACT };
         let (boxes, slabs) = (caster(&box_tree), caster(&slab_tree));
         bvh2.counts = boxes.count(rays, Ask::Closest, u64::MAX);
         ssh.counts = slabs.count(rays, Ask::Closest, u64::MAX);

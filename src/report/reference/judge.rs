@@ -104,18 +104,26 @@ impl Tally {
         }
     }
 
+    /// Counts one more answer to whether a ray is blocked.
+    pub fn add_blocked(&mut self, due: bool, found: bool) {
+        self.rays += 1;
+        self.hits += u64::from(due);
+        self.false_misses += u64::from(due && !found);
+        self.false_hits += u64::from(!due && found);
+    }
+
     /// Answers that differ in kind: missed, false or another triangle.
     pub fn mistakes(&self) -> u64 {
         self.false_misses + self.false_hits + self.wrong
     }
 
-    /// The error of t that a share of right answers stays below or at; 1 gives the largest. `None` without right answers.
-    pub fn t_quantile(&self, share: f64) -> Option<f64> {
+    /// The errors of t that these shares of right answers stay below or at; 1 gives the largest. `None` without right answers.
+    pub fn t_quantiles<const N: usize>(&self, shares: [f64; N]) -> [Option<f64>; N] {
         let mut errors = self.t_errors.clone();
         errors.sort_by(f64::total_cmp);
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a place in the list")]
-        let place = (share * errors.len() as f64).ceil() as usize;
-        errors.get(place.clamp(1, errors.len().max(1)) - 1).copied()
+        let place = |share: f64| (share * errors.len() as f64).ceil() as usize;
+        shares.map(|share| errors.get(place(share).clamp(1, errors.len().max(1)) - 1).copied())
     }
 }
 
@@ -194,9 +202,12 @@ mod tests {
         other.add(None, Some(&hit(4, 2.0, 0.0)));
         other.add(Some(&truth), Some(&hit(9, 2.0, 0.0)));
         tally += other;
+        let mut blocked = Tally::default();
+        [(true, true), (true, false), (false, true), (false, false)].map(|(a, b)| blocked.add_blocked(a, b));
+        assert_eq!([blocked.rays, blocked.hits, blocked.false_misses, blocked.false_hits], [4, 2, 1, 1]);
         assert_eq!([tally.rays, tally.hits, tally.ties, tally.mistakes(), tally.inexact], [5, 4, 4, 3, 1]);
-        assert_eq!([0.0, 0.5, 0.51, 1.0].map(|s| tally.t_quantile(s)), [Some(0.0), Some(0.0), Some(2.0), Some(2.0)]);
-        assert_eq!(Tally::default().t_quantile(0.5), None);
+        assert_eq!(tally.t_quantiles([0.0, 0.5, 0.51, 1.0]), [Some(0.0), Some(0.0), Some(2.0), Some(2.0)]);
+        assert_eq!(Tally::default().t_quantiles([0.5]), [None]);
     }
 
     #[test]

@@ -8,6 +8,7 @@ use super::{
 };
 use crate::{
     accel::{AccelSpec, AnyAccel, Refit},
+    geom::Forms,
     report::{
         Monitor, RayClass, ReportError, Subject, machine,
         measure::{Caster, Samples},
@@ -96,7 +97,7 @@ fn cast(
     questions: &Questions,
     options: &Options,
 ) {
-    let caster = Caster { accel, prims: subject.prims(), simd: options.simd };
+    let caster = Caster { accel, prims: subject.prims(), simd: options.simd, forms: Forms::EXACT };
     let is_primary = questions.class == RayClass::Primary;
     // Both classes take the same number of rays.
     let n = row.count.unwrap_or_else(|| affordable(spec, &caster, questions, options.budget()));

@@ -7,7 +7,7 @@ use super::{
 };
 use crate::{
     accel::{AccelKind, AccelSpec, AnyAccel, Refit},
-    geom::{Ray, Triangles},
+    geom::{Forms, Ray, Triangles},
     report::{
         Monitor, RayClass, ReportError, Subject,
         measure::{Answer, Caster, Samples},
@@ -43,7 +43,7 @@ pub(super) fn questions(
     simd: SimdLevel,
 ) -> Result<Vec<Questions>, ReportError> {
     let accel = AccelSpec::new(AccelKind::Bvh2).build(prims)?;
-    let caster = Caster { accel: &accel, prims: *prims, simd };
+    let caster = Caster { accel: &accel, prims: *prims, simd, forms: Forms::EXACT };
     let Some(sphere) = Sphere::around(accel.bounds()) else { return Ok(Vec::new()) };
     let primary = rays::primary(View::whole(sphere), [side; 2]);
     let hits = caster.answers(&primary, RayClass::Primary.ask());
@@ -128,7 +128,7 @@ fn build_row(
             let prims = subject.moved_prims();
             row.decay = Some(refitted.decay());
             row.violations.extend(refitted.validate(&prims).err().map(|v| format!("broken after the refit: {}", v.0)));
-            let caster = Caster { accel: &refitted, prims, simd: options.simd };
+            let caster = Caster { accel: &refitted, prims, simd: options.simd, forms: Forms::EXACT };
             row.refit_differences = moved.map(|q| differences(spec, &caster, q, options.budget()));
         }
     }
@@ -244,7 +244,7 @@ fn ray_rows(
     };
     let mut turns = Vec::with_capacity(built.len());
     for b in built {
-        let caster = Caster { accel: &b.accel, prims: subject.prims(), simd: options.simd };
+        let caster = Caster { accel: &b.accel, prims: subject.prims(), simd: options.simd, forms: Forms::EXACT };
         let (rays, due, row) = turn(b, &caster);
         let found = vec![Answer::MISS; rays.len()];
         turns.push(Turn { caster, rays, due, found, row });
