@@ -1,4 +1,6 @@
-use crate::{accel::BuildError, output::OutputError, scene::import::ImportError};
+use crate::{
+    accel::BuildError, dynamics::FrameError, output::OutputError, render::RenderError, scene::import::ImportError,
+};
 
 /// Why a report was not made.
 #[derive(Debug, thiserror::Error)]
@@ -13,6 +15,12 @@ pub enum ReportError {
     /// A structure that everything is compared with could not be built.
     #[error(transparent)]
     Build(#[from] BuildError),
+    /// A frame could not be made.
+    #[error(transparent)]
+    Frame(#[from] FrameError),
+    /// A picture could not be rendered.
+    #[error(transparent)]
+    Render(#[from] RenderError),
     /// A generated scene does not exist in the size asked for.
     #[error("{scene}: {reason}")]
     Scene {

@@ -1,6 +1,5 @@
 //! `kinora info`: what a file holds and what it needs.
 
-mod left_out;
 mod summary;
 mod text;
 

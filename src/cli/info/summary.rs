@@ -3,12 +3,10 @@
 use std::collections::HashSet;
 
 use kinora::{
-    anim::{MotionClass, classify},
+    anim::{LeftOut, MotionClass, classify, left_out},
     scene::{MeshPart, Scene},
 };
 use serde::Serialize;
-
-use super::left_out::{self, LeftOut};
 
 /// What a file holds.
 #[derive(Debug, Serialize)]
@@ -104,7 +102,7 @@ impl<'s> Summary<'s> {
             extensions_used: &scene.extensions_used,
             extensions_ignored: &scene.extensions_ignored,
             classes,
-            left_out: left_out::find(scene, classes),
+            left_out: left_out(scene, &classify(scene)),
             warnings: &scene.warnings,
         }
     }

@@ -58,7 +58,7 @@ fn allowed(forms: Forms) -> Option<&'static Allowed> {
 }
 
 /// True for rays that are hard on purpose.
-fn is_aimed(class: Class) -> bool {
+pub(super) fn is_aimed(class: Class) -> bool {
     match class {
         Class::Common(_) => false,
         Class::Edges => true,

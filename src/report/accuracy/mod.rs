@@ -4,17 +4,22 @@
 //! all; lossy ones stay below stated bounds.
 
 mod bounds;
+mod flip;
+mod images;
+mod needs;
 mod pareto;
 mod point;
 mod quest;
 mod rays;
 mod same;
+mod skin;
 mod source;
+mod summary;
 mod updates;
 
 pub use source::Source;
 
-use super::{Kind, Monitor, Report, ReportError, Settings, structures};
+use super::{Check, Kind, Monitor, Report, ReportError, Settings, Table, structures};
 use crate::{accel::AccelSpec, simd::SimdLevel};
 
 /// What to measure, and how.
@@ -44,9 +49,68 @@ impl Options {
         if self.quick { 16_384 } else { 262_144 }
     }
 
+    /// Width and height of pictures.
+    fn picture(&self) -> [u32; 2] {
+        if self.quick { [160, 90] } else { [640, 360] }
+    }
+
+    /// Samples a pixel of a picture without noise to speak of.
+    fn converged(&self) -> u32 {
+        if self.quick { 64 } else { 512 }
+    }
+
     /// Work (as `Counts::work` has it) that a point may spend on one repeat of one class.
     fn budget(&self) -> u64 {
         if self.quick { 400_000 } else { 8_000_000 }
+    }
+}
+
+/// All rows so far.
+#[derive(Default)]
+struct Rows {
+    rays: Vec<rays::RayRow>,
+    updates: Vec<updates::UpdateRow>,
+    skins: Vec<skin::SkinRow>,
+    images: Vec<images::ImageRow>,
+    same: Vec<same::SameRow>,
+    needs: Vec<needs::NeedRow>,
+}
+
+impl Rows {
+    fn measure(&mut self, source: &Source, options: &Options, monitor: &mut dyn Monitor) -> Result<(), ReportError> {
+        monitor.begin(&format!("{}: right answers", source.name))?;
+        let quests = quest::quests(source, options.rays());
+        self.rays.extend(rays::measure(source, &quests, options, monitor)?);
+        self.updates.extend(updates::measure(source, &quests, options, monitor)?);
+        self.skins.extend(skin::measure(source, options, monitor)?);
+        self.images.extend(images::measure(source, options, monitor)?);
+        self.same.extend(same::measure(source, &quests, options, monitor)?);
+        self.needs.extend(needs::measure(source, options, monitor)?);
+        Ok(())
+    }
+
+    fn checks(&self) -> Vec<Check> {
+        let mut checks = bounds::checks(&self.rays);
+        checks.extend(updates::checks(&self.updates));
+        checks.extend(same::checks(&self.same));
+        checks.extend(skin::checks(&self.skins));
+        checks.extend(images::checks(&self.images));
+        checks
+    }
+
+    fn tables(&self) -> Vec<Table> {
+        let mut tables = vec![
+            bounds::table(),
+            rays::table(&self.rays),
+            updates::table(&self.updates),
+            skin::table(&self.skins),
+            images::table(&self.images),
+            same::table(&self.same),
+            needs::table(&self.needs),
+            pareto::table(&self.rays),
+        ];
+        tables.retain(|t| !t.rows.is_empty());
+        tables
     }
 }
 
@@ -65,20 +129,13 @@ pub fn report(sources: &[Source], options: &Options, monitor: &mut dyn Monitor) 
     };
     let mut report = Report::new(Kind::Accuracy, settings);
     let defaults = if sources.is_empty() { source::defaults(options.quick)? } else { Vec::new() };
-    let (mut rows, mut updated, mut same) = (Vec::new(), Vec::new(), Vec::new());
+    let mut rows = Rows::default();
     for source in sources.iter().chain(&defaults) {
-        monitor.begin(&format!("{}: right answers", source.name))?;
-        let quests = quest::quests(source, options.rays());
-        rows.extend(rays::measure(source, &quests, options, monitor)?);
-        updated.extend(updates::measure(source, &quests, options, monitor)?);
-        same.extend(same::measure(source, &quests, options, monitor)?);
+        rows.measure(source, options, monitor)?;
     }
-    report.checks = bounds::checks(&rows);
-    report.checks.extend(updates::checks(&updated));
-    report.checks.extend(same::checks(&same));
-    report.tables =
-        vec![bounds::table(), rays::table(&rows), updates::table(&updated), same::table(&same), pareto::table(&rows)];
-    report.tables.retain(|t| !t.rows.is_empty());
-    report.plots = pareto::plots(&rows);
+    report.summary = summary::summary(&rows.rays);
+    report.checks = rows.checks();
+    report.tables = rows.tables();
+    report.plots = pareto::plots(&rows.rays);
     Ok(report)
 }

@@ -203,7 +203,9 @@ mod tests {
         other.add(Some(&truth), Some(&hit(9, 2.0, 0.0)));
         tally += other;
         let mut blocked = Tally::default();
-        [(true, true), (true, false), (false, true), (false, false)].map(|(a, b)| blocked.add_blocked(a, b));
+        for (due, found) in [(true, true), (true, false), (false, true), (false, false)] {
+            blocked.add_blocked(due, found);
+        }
         assert_eq!([blocked.rays, blocked.hits, blocked.false_misses, blocked.false_hits], [4, 2, 1, 1]);
         assert_eq!([tally.rays, tally.hits, tally.ties, tally.mistakes(), tally.inexact], [5, 4, 4, 3, 1]);
         assert_eq!(tally.t_quantiles([0.0, 0.5, 0.51, 1.0]), [Some(0.0), Some(0.0), Some(2.0), Some(2.0)]);

@@ -1,19 +1,21 @@
-//! Work that this scene does not ask for and that is therefore neither done nor stored.
+//! Work that a scene does not ask for and that is therefore neither done nor stored.
 
-use kinora::scene::{AlphaMode, Material, MaterialId, NodeId, Scene, Topology};
 use serde::Serialize;
 
-use super::summary::Classes;
+use super::MotionClass;
+use crate::scene::{AlphaMode, Material, MaterialId, NodeId, Scene, Topology};
 
 /// A feature that is left out, and why.
-#[derive(Debug, PartialEq, Eq, Serialize)]
-pub(super) struct LeftOut {
-    pub(super) feature: &'static str,
-    pub(super) why: String,
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct LeftOut {
+    /// What is neither done nor stored.
+    pub feature: &'static str,
+    /// What the scene lacks that would need it.
+    pub why: String,
 }
 
-/// Everything left out for this scene, stages before shading.
-pub(super) fn find(scene: &Scene, classes: Classes) -> Vec<LeftOut> {
+/// Everything left out for this scene, stages before shading; `classes` are those of its instances.
+pub fn left_out(scene: &Scene, classes: &[MotionClass]) -> Vec<LeftOut> {
     let mut found = Vec::new();
     let mut note = |is_left_out: bool, feature: &'static str, why: String| {
         if is_left_out {
@@ -28,16 +30,17 @@ pub(super) fn find(scene: &Scene, classes: Classes) -> Vec<LeftOut> {
 
 type Note<'n> = dyn FnMut(bool, &'static str, String) + 'n;
 
-fn motion(scene: &Scene, classes: Classes, note: &mut Note<'_>) {
+fn motion(scene: &Scene, classes: &[MotionClass], note: &mut Note<'_>) {
     let drawn = || scene.instances.iter().map(|i| (&scene.nodes[i.node.index()], scene.part(*i)));
     let is_skinned = drawn().any(|(node, part)| node.skin.is_some() && part.influences.is_some());
     let morphs = drawn().any(|(_, part)| part.targets.iter().any(|t| !t.positions.is_empty()));
     note(!is_skinned, "skinning", "no drawn part has a skin".to_owned());
     note(!morphs, "morphing", "no drawn part has morph targets".to_owned());
-    let moving = classes.rigid + classes.deforming;
+    let still = classes.iter().filter(|&&c| c == MotionClass::Static).count();
+    let moving = classes.len() - still;
     note(moving == 0, "deform, refit and rebuild", "no part moves in any animation".to_owned());
-    let still = format!("{} of {} parts never move: built once", classes.still, classes.still + moving);
-    note(moving > 0 && classes.still > 0, "refit of static parts", still);
+    let why = format!("{still} of {} parts never move: built once", classes.len());
+    note(moving > 0 && still > 0, "refit of static parts", why);
 }
 
 fn geometry(scene: &Scene, note: &mut Note<'_>) {
@@ -81,13 +84,12 @@ fn drawn_materials(scene: &Scene) -> Vec<&Material> {
 
 #[cfg(test)]
 mod tests {
-    use kinora::scene::builtin;
-
     use super::*;
+    use crate::scene::builtin;
 
     #[test]
     fn an_empty_scene_leaves_everything_out() {
-        let features: Vec<_> = find(&Scene::default(), Classes::default()).into_iter().map(|l| l.feature).collect();
+        let features: Vec<_> = left_out(&Scene::default(), &[]).into_iter().map(|l| l.feature).collect();
         for feature in ["skinning", "deform, refit and rebuild", "alpha test", "texture lookup and mipmaps"] {
             assert!(features.contains(&feature), "{features:?}");
         }
@@ -96,8 +98,7 @@ mod tests {
     #[test]
     fn the_walking_figure_needs_skinning() {
         let scene = builtin::load("walk").expect("built in");
-        let classes = Classes { still: 1, rigid: 0, deforming: 1 };
-        let found = find(&scene, classes);
+        let found = left_out(&scene, &[MotionClass::Static, MotionClass::Deforming]);
         assert!(found.iter().all(|l| l.feature != "skinning" && !l.why.is_empty()));
         assert!(found.iter().any(|l| l.feature == "refit of static parts"));
     }
