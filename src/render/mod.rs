@@ -15,6 +15,7 @@ mod block;
 mod brdf;
 mod camera;
 mod context;
+mod departure;
 mod exposure;
 mod film;
 mod filter;

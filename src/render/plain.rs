@@ -24,7 +24,7 @@ const AO_PATTERN: u32 = 0;
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct PlainPoints<'s, F> {
     color: V3<F>,
-    surface: &'s Surface<F>,
+    surface: &'s Surface<'s, F>,
     mask: u32,
 }
 
@@ -36,7 +36,7 @@ pub(crate) fn probe_count(shading: Shading) -> usize {
 impl<'s, F: Floats> PlainPoints<'s, F> {
     /// The points of `surface`, which lies at `spots`; ambient occlusion begins black.
     #[cfg_attr(not(debug_assertions), inline(always))]
-    pub(crate) fn new(ctx: &FrameContext<'_>, spots: &Spots<'_>, surface: &'s Surface<F>) -> Self {
+    pub(crate) fn new(ctx: &FrameContext<'_>, spots: &Spots<'_>, surface: &'s Surface<'s, F>) -> Self {
         let color = match ctx.settings.shading {
             Shading::Depth => {
                 let mut grey = row(spots.t::<F>());

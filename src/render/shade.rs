@@ -19,13 +19,18 @@ use super::{
 
 /// Least light that is worth a shadow ray.
 const DARK: f32 = 1e-5;
+/// Part of the way to a light that must be clear: a light may lie in a surface. A wall right in front of one is not missed.
+///
+/// # Source
+/// `ShadowEpsilon` of Pharr, Jakob and Humphreys, "Physically Based Rendering", 4th edition, section 14.3.
+const REACH: f32 = 0.9999;
 /// Purpose number of the pattern that picks points on lights.
 const LIGHT_PATTERN: u32 = 1;
 
 /// Surface points with everything that shading needs, before any light is asked.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LitPoints<'s, F> {
-    surface: &'s Surface<F>,
+    surface: &'s Surface<'s, F>,
     reflectance: Reflectance<F>,
     view: View<F>,
     /// Light that leaves towards the viewer.
@@ -47,7 +52,7 @@ impl<'s, F: Floats> LitPoints<'s, F> {
         spots: &Spots<'a>,
         patch: &Patch<F>,
         mut maps: Maps<'a, '_, F>,
-        surface: &'s Surface<F>,
+        surface: &'s Surface<'s, F>,
     ) -> Self {
         let (zero, one) = (F::splat(0.0), F::splat(1.0));
         let mut base = spots.vector::<F>(|spot| spot.material.base.truncate());
@@ -102,7 +107,7 @@ impl<F: Floats> Points<F> for LitPoints<'_, F> {
         let reflected = self.reflectance.evaluate(&self.view, surface.n_shade, surface.view, dir, shade_cos);
         let light = reflected.times(level) * terminator(geom_cos, shade_cos, surface.between);
         // Infinite distances stay infinite.
-        let t_far = distance * F::splat(0.9995);
+        let t_far = distance * F::splat(REACH);
         Probes {
             mask: mask & F::splat(DARK).lt(light.max_element()),
             origin: surface.shadow_origin(dir),
@@ -192,7 +197,12 @@ fn widened<F: Floats>(roughness: F, map_length: F) -> F {
 }
 
 #[cfg_attr(not(debug_assertions), inline(always))]
-fn surroundings<F: Floats>(ctx: &FrameContext<'_>, surface: &Surface<F>, finish: &Finish<F>, view: &View<F>) -> V3<F> {
+fn surroundings<F: Floats>(
+    ctx: &FrameContext<'_>,
+    surface: &Surface<'_, F>,
+    finish: &Finish<F>,
+    view: &View<F>,
+) -> V3<F> {
     let two = F::splat(2.0);
     let n = surface.n_shade;
     let mirrored = n * (two * n.dot(surface.view)) - surface.view;

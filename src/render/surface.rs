@@ -1,28 +1,21 @@
-//! From hits to surface points: positions with their errors, normals.
+//! From hits to surface points: positions, normals.
 
 use glam::Vec3;
 
 use super::{
     context::FrameContext,
+    departure::Departure,
     found::{Maps, Placed, Spots},
     material::Channel,
     patch::Patch,
-    wide::{Floats, V3, row},
+    wide::{Floats, V3},
 };
-
-/// Least share that an axis has of the largest error: on a coordinate plane the error is 0, and a ray that starts a
-/// denormal number above the plane could be decided by integers only.
-const LEAST_ERROR: f32 = 1.0 / 256.0;
-
-/// Bound of the relative rounding error of a barycentric point: seven roundings.
-const POINT_ERROR: f32 = 7.0 * 0.5 * f32::EPSILON / (1.0 - 7.0 * 0.5 * f32::EPSILON);
 
 /// Surface points ready for shading, a lane each.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Surface<F> {
+pub(crate) struct Surface<'p, F> {
     pub(crate) point: V3<F>,
-    /// Bound of the error of `point` along each axis.
-    error: V3<F>,
+    departure: Departure<'p, F>,
     /// Unit geometric normal on the viewer's side.
     pub(crate) n_geom: V3<F>,
     /// Unit shading normal on the viewer's side, never turned away from the viewer.
@@ -37,23 +30,20 @@ pub(crate) struct Surface<F> {
     pub(crate) map_length: F,
 }
 
-impl<F: Floats> Surface<F> {
+impl<'p, F: Floats> Surface<'p, F> {
     /// The surfaces at `spots`, whose triangles are `patch`, where rays along `dir` met them.
     #[cfg_attr(not(debug_assertions), inline(always))]
     pub(crate) fn new<'a>(
         ctx: &FrameContext<'a>,
         spots: &Spots<'a>,
-        patch: &Patch<F>,
+        patch: &'p Patch<F>,
         maps: &mut Maps<'a, '_, F>,
         dir: V3<F>,
     ) -> Self {
         let (zero, one) = (F::splat(0.0), F::splat(1.0));
         let view = (-dir).unit_or(V3::splat(Vec3::Z));
-        let [w, u, v] = patch.weights;
-        let [a, b, c] = patch.corners;
         let point = patch.blend3(patch.corners);
-        let error = ((a * w).abs() + (b * u).abs() + (c * v).abs()) * F::splat(POINT_ERROR);
-        let error = error.max(V3::all(error.max_element() * F::splat(LEAST_ERROR)));
+        let departure = Departure::new(patch, point, spots.mask);
         let side = F::select(spots.lanes(|spot| spot.info.mirrored), -one, one);
         // Outward by the file's winding, before it is turned to the viewer.
         let outward = (patch.cross * side).unit_or(view);
@@ -64,7 +54,8 @@ impl<F: Floats> Surface<F> {
         let smooth = V3::select(smoothed, patch.blend3(normals).unit_or(outward), outward);
         let [na, nb, nc] = normals;
         let bulge = bulge(point, patch, [na * facing, nb * facing, nc * facing]);
-        let bulge = V3::select(smoothed, bulge, V3::zero());
+        let lifts = F::splat(0.0).le(bulge.dot(n_geom));
+        let bulge = V3::select(smoothed & lifts, bulge, V3::zero());
         let (mapped, map_length) = match maps.place(Channel::Normal) {
             Some(placed) => mapped_normal(ctx, spots, patch, maps, &placed, smooth),
             None => (smooth, one),
@@ -73,46 +64,19 @@ impl<F: Floats> Surface<F> {
         let turn = F::select(smooth.dot(outward).lt(zero), -facing, facing);
         let n_shade = towards_viewer(mapped * turn, view);
         let between = (smooth * turn).dot(n_geom);
-        Self { point, error, n_geom, n_shade, between, view, bulge, map_length }
+        Self { point, departure, n_geom, n_shade, between, view, bulge, map_length }
     }
 
-    /// Where rays that leave along `dir` start: past the error of the point, on the side that they leave to.
-    ///
-    /// # Source
-    /// Pharr, Jakob and Humphreys, "Physically Based Rendering", 4th edition, section 6.8.6.
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    /// Where rays that leave along `dir` start.
+    #[inline(always)]
     pub(crate) fn origin(&self, dir: V3<F>) -> V3<F> {
-        let away = V3::select(dir.dot(self.n_geom).lt(F::splat(0.0)), -self.n_geom, self.n_geom);
-        let offset = away * away.abs().dot(self.error);
-        let start = self.point + offset;
-        V3 { x: past(start.x, away.x), y: past(start.y, away.y), z: past(start.z, away.z) }
+        self.departure.origin(self.n_geom, dir)
     }
 
     /// [`Surface::origin`] for shadow rays: lifted to the smooth surface, so that facets do not shadow themselves.
     #[inline(always)]
     pub(crate) fn shadow_origin(&self, dir: V3<F>) -> V3<F> {
         self.origin(dir) + self.bulge
-    }
-}
-
-/// The next float in the direction of `away`: a point with error zero, as on a coordinate plane, must leave it too.
-#[inline(always)]
-fn past<F: Floats>(x: F, away: F) -> F {
-    let (mut x, away) = (row(x), row(away));
-    for i in 0..F::LEN {
-        x[i] = past_one(x[i], away[i]);
-    }
-    F::load(&x)
-}
-
-#[inline(always)]
-fn past_one(x: f32, away: f32) -> f32 {
-    if away > 0.0 {
-        x.next_up()
-    } else if away < 0.0 {
-        x.next_down()
-    } else {
-        x
     }
 }
 

@@ -18,9 +18,11 @@ mod hit;
 mod int;
 mod measure;
 mod ratio;
+mod side;
 mod volumes;
 
 pub use estimate::{BOUND, Quotients};
 pub use hit::{RayRange, TriangleHit};
 pub use measure::{area, volume};
 pub use ratio::Ratio;
+pub use side::{side, slope};

@@ -66,6 +66,32 @@ pub(super) fn dot(a: &Int3, b: &Int3) -> Int {
     a[0].mul(&b[0]).add(&a[1].mul(&b[1])).add(&a[2].mul(&b[2]))
 }
 
+/// As [`super::side`], by integers alone.
+#[cold]
+#[inline(never)]
+pub(super) fn side_of_plane(corners: &[Vec3; 3], point: Vec3) -> i32 {
+    let points = [corners[0], corners[1], corners[2], point];
+    if !points.iter().all(|p| p.is_finite()) {
+        return 0;
+    }
+    let exponent = least_exponent(&points);
+    let [a, b, c, p] = points.map(|p| to_ints(p, exponent));
+    dot(&cross(&sub(&b, &a), &sub(&c, &a)), &sub(&p, &a)).signum()
+}
+
+/// As [`super::slope`], by integers alone.
+#[cold]
+#[inline(never)]
+pub(super) fn slope_to_plane(corners: &[Vec3; 3], dir: Vec3) -> i32 {
+    if !(dir.is_finite() && corners.iter().all(|p| p.is_finite())) {
+        return 0;
+    }
+    let exponent = least_exponent(corners);
+    let [a, b, c] = corners.map(|p| to_ints(p, exponent));
+    let dir = to_ints(dir, least_exponent(&[dir]));
+    dot(&cross(&sub(&b, &a), &sub(&c, &a)), &dir).signum()
+}
+
 /// The four volumes as integers, D made positive.
 ///
 /// With p the exponent of positions and q that of the direction: D, U and V are in units of 2^(2p+q), T in 2^(3p).
