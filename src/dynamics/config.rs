@@ -18,6 +18,14 @@ pub enum FrameError {
     /// The background builder could not be started.
     #[error("cannot start the background builder: {0}")]
     BuilderStart(#[source] std::io::Error),
+    /// A vertex lies where f32 ends, so its place is not known.
+    #[error("{file}: node {node}: a vertex lies at or beyond the end of f32 ({limit:e})", limit = f32::MAX)]
+    OutOfRange {
+        /// The scene's file.
+        file: String,
+        /// The glTF index of the node that places it.
+        node: u32,
+    },
     /// More than 32-bit numbers allow for.
     #[error("{actual} {what} are placed together, at most {limit} fit")]
     TooMany {

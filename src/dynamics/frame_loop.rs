@@ -98,7 +98,7 @@ impl FrameLoop {
     /// Poses every actor (`clips[i]` for actor i, none for the rest pose) and returns the frame's world.
     ///
     /// # Errors
-    /// When foreign code changed how this thread or the pool's compute, a build fails, the background builder panicked, or more is placed than numbers allow for. The loop
+    /// When foreign code changed how this thread or the pool's compute, a build fails, the background builder panicked, a vertex lies at the end of f32, or more is placed than numbers allow for. The loop
     /// can go on after a failed rebuild; the group concerned keeps its refitted tree.
     pub fn advance(&mut self, clips: &[&[ActiveClip]]) -> Result<(Arc<World>, StageTimes), FrameError> {
         check_float_mode()?;
@@ -147,6 +147,10 @@ impl FrameLoop {
         let next = Arc::get_mut(&mut world).expect("a taken buffer has one owner");
         self.stage.fill(next, self.top);
         next.forms = self.config.forms;
+        if let Some(instance) = next.beyond_f32() {
+            let file = next.actor_scene(instance.actor as usize).file.clone();
+            return Err(FrameError::OutOfRange { file, node: instance.part.node.0 });
+        }
         self.worlds.keep(world.clone());
         times.refit = began.elapsed();
         Ok((world, times))

@@ -21,8 +21,9 @@ use std::{fmt, sync::Arc};
 use glam::Vec3;
 
 use crate::{
+    accel::Violation,
     anim::Pose,
-    geom::{Aabb, Forms, InstanceId, PrimId},
+    geom::{Aabb, Forms, Hit, InstanceId, PrimId, leave},
     scene::{PartInstance, Scene},
 };
 
@@ -122,6 +123,36 @@ impl World {
         let positions = self.positions(instance);
         self.scene(instance).part(self.instances[instance.0 as usize].part).triangles[prim.0 as usize]
             .map(|i| positions[i as usize])
+    }
+
+    /// Where a ray starts that leaves `hit` along `dir`: see [`leave`]. Panics when a number of `hit` is out of range.
+    pub fn leave(&self, hit: &Hit, dir: Vec3) -> Vec3 {
+        leave(&self.corners(hit.instance, hit.prim), hit.u, hit.v, dir)
+    }
+
+    /// Checks every structure, and every group's box, against the vertices of this frame. O(triangles).
+    ///
+    /// # Errors
+    /// The first violation found.
+    pub fn validate(&self) -> Result<(), Violation> {
+        for group in &self.groups {
+            let prims = group.triangles();
+            group.accel.validate(&prims)?;
+            let outside = (0..).map(PrimId).take(prims.len()).find(|&p| !group.bounds.contains(prims.finite_aabb(p)));
+            if let Some(prim) = outside {
+                return Err(Violation(format!("triangle {} lies outside of its group's box", prim.0)));
+            }
+        }
+        Ok(())
+    }
+
+    /// The first instance with a triangle that reaches the end of f32, if any. O(groups) when there is none.
+    pub(crate) fn beyond_f32(&self) -> Option<&WorldInstance> {
+        let at_end = |aabb: Aabb| !aabb.is_empty() && aabb.min.abs().max(aabb.max.abs()).max_element() >= f32::MAX;
+        let group = self.groups.iter().find(|group| at_end(group.bounds))?;
+        let prims = group.triangles();
+        let prim = (0..).map(PrimId).take(prims.len()).find(|&p| at_end(prims.finite_aabb(p)))?;
+        self.instances.get(group.layout.key(prim).0.0 as usize)
     }
 
     /// The scene that an instance belongs to.
