@@ -5,7 +5,7 @@
 //! cache level; the loops are plain arithmetic on arrays, compiled for the machine's SIMD level, and give the
 //! same bits on each.
 
-use glam::{DAffine3, Vec3};
+use glam::{DAffine3, DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::{Pose, pose::JointColumns};
@@ -112,16 +112,49 @@ pub fn deform_parallel(level: SimdLevel, scene: &Scene, pose: &Pose, instance: P
         .for_each(|(chunk, out)| deform_range_at(level, scene, pose, instance, chunk * DEFORM_GRAIN, out));
 }
 
+/// The vertices of [`deform`] before they are rounded: what its error is measured against.
+///
+/// Coordinates beyond the range of `f32` stay as they are. Otherwise as there.
+///
+/// # Panics
+/// When `out` has another length than the part has vertices.
+pub fn deform_unrounded(scene: &Scene, pose: &Pose, instance: PartInstance, out: &mut [DVec3]) {
+    let part = scene.part(instance);
+    assert_eq!(out.len(), part.positions.len(), "one place a vertex");
+    let weights = pose.weights(instance.node);
+    dispatch(SimdLevel::best(), Deform { part, weights, placement: placement(scene, pose, instance), first: 0, out });
+}
+
+/// What a vertex is kept as.
+trait Kept: Copy {
+    /// From world-space coordinates; the fourth number does not count.
+    fn from_wide(v: &[f64; 4]) -> Self;
+}
+
+impl Kept for Vec3 {
+    #[inline(always)]
+    fn from_wide(v: &[f64; 4]) -> Self {
+        rounded(v)
+    }
+}
+
+impl Kept for DVec3 {
+    #[inline(always)]
+    fn from_wide(v: &[f64; 4]) -> Self {
+        Self::new(v[0], v[1], v[2])
+    }
+}
+
 /// The work of one range.
-struct Deform<'a> {
+struct Deform<'a, V> {
     part: &'a MeshPart,
     weights: &'a [f64],
     placement: Placement<'a>,
     first: usize,
-    out: &'a mut [Vec3],
+    out: &'a mut [V],
 }
 
-impl Task for Deform<'_> {
+impl<V: Kept> Task for Deform<'_, V> {
     type Output = ();
 
     #[inline(always)]
@@ -142,7 +175,7 @@ impl Task for Deform<'_> {
                 },
             }
             for (out, v) in out.iter_mut().zip(world) {
-                *out = rounded(v);
+                *out = V::from_wide(v);
             }
         }
     }

@@ -17,7 +17,7 @@ mod transform;
 pub use bounds::animation_bounds;
 pub use class::{MotionClass, classify};
 pub use clock::loop_time;
-pub use deform::{DEFORM_GRAIN, deform, deform_parallel, deform_range, deform_range_at};
+pub use deform::{DEFORM_GRAIN, deform, deform_parallel, deform_range, deform_range_at, deform_unrounded};
 pub use left_out::{LeftOut, left_out};
 pub use normals::{vertex_normal, vertex_tangent};
 pub use pose::{ActiveClip, Pose};
