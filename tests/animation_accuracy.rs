@@ -107,7 +107,11 @@ fn positions_differ_from_the_reference_by_one_rounding() {
         assert!(kept_error <= allowed, "{id}: {kept_error:e}");
         // Beyond what readings of the specification differ by, only the rounding is left.
         if allowed <= 1e-5 {
-            assert!(wide_error <= 1e-9 && kept_error <= loss * 1.05 + 1e-9, "{id}: {wide_error:e} {kept_error:e}");
+            // Quantized numbers are rounded to f32 when they are read: 2^-24 of their size.
+            assert!(
+                wide_error <= 6e-8 && kept_error <= loss * 1.05 + wide_error,
+                "{id}: {wide_error:e} {kept_error:e}"
+            );
         }
         (worst_kept, worst_wide) = (worst_kept.max(kept_error), worst_wide.max(wide_error));
     }
@@ -215,12 +219,12 @@ fn a_pose_is_the_same_bits_after_ten_thousand_loops() {
         let bits = |parts: &[Posed]| -> Vec<[u32; 3]> {
             parts.iter().flat_map(|(kept, _)| kept.iter().map(|p| p.to_array().map(f32::to_bits))).collect()
         };
-        for step in 0..8 {
+        for step in 0..4 {
             // Phases in binary fractions: a duration is f32, so whole rounds and the sum are exact.
-            let phase = (duration_s * f64::from(step) / 8.0 * 1024.0).floor() / 1024.0;
+            let phase = (duration_s * f64::from(step) / 4.0 * 1024.0).floor() / 1024.0;
             let due = bits(&at(phase));
-            for loops in [1.0, 2.0, 7.0, 100.0, 9_999.0, 10_000.0] {
-                for speed in [1.0, 0.5, 2.0] {
+            for loops in [1.0, 7.0, 9_999.0, 10_000.0] {
+                for speed in [1.0, 0.5] {
                     let time_s = loop_time(phase, loops * duration_s / speed, speed, duration_s);
                     assert!(
                         bits(&at(time_s)) == due,
