@@ -3,6 +3,7 @@
     clippy::cast_possible_truncation,
     clippy::cast_possible_wrap,
     clippy::cast_sign_loss,
+    clippy::float_cmp,
     reason = "small numbers; bit patterns"
 )]
 
@@ -11,7 +12,9 @@ mod common;
 use std::str::FromStr;
 
 use kinora::{
-    collide::{Passage, box_pairs, boxes_meet, ray_box, sweep_box, triangle_contact, triangles_meet},
+    collide::{
+        Passage, box_pairs, boxes_meet, ray_box, sweep_box, triangle_contact, triangle_distance, triangles_meet,
+    },
     geom::{Aabb, Ray},
     glam::{DVec3, Vec3},
 };
@@ -57,7 +60,7 @@ fn close(a: f64, b: &BigRational, bound: f64, size: f64) -> bool {
 }
 
 fn is_at(point: DVec3, due: &Value, size: f64) -> bool {
-    (0..3).all(|axis| close(point[axis], &number(&due[axis]), 2.0_f64.powi(-39), size))
+    (0..3).all(|axis| close(point[axis], &number(&due[axis]), 2.0_f64.powi(-31), size))
 }
 
 fn check_triangles(case: &Value) {
@@ -68,6 +71,7 @@ fn check_triangles(case: &Value) {
     assert_eq!(triangles_meet(&b, &a), due, "{} the other way round", id(case));
     let contact = triangle_contact(&a, &b);
     assert_eq!(contact.is_some(), due, "{}: {contact:?}", id(case));
+    check_distance(case, &a, &b);
     let Some(contact) = contact else { return };
     assert_eq!(Some(i64::from(contact.dim)), expect["dim"].as_i64(), "{}: {contact:?}", id(case));
     let points = expect["points"].as_array().expect("points");
@@ -75,6 +79,17 @@ fn check_triangles(case: &Value) {
     let size = a.iter().chain(&b).map(|c| f64::from(c.abs().max_element())).fold(0.0, f64::max);
     for due in points {
         assert!(contact.points.iter().any(|&p| is_at(p, due, size)), "{}: {due} is not in {contact:?}", id(case));
+    }
+}
+
+fn check_distance(case: &Value, a: &[Vec3; 3], b: &[Vec3; 3]) {
+    let nearest = triangle_distance(a, b);
+    assert_eq!(nearest.is_some(), case["expect"]["valid"] == true, "{}", id(case));
+    if let Some(nearest) = nearest {
+        let due = case["expect"]["dist"].as_f64().expect("a distance");
+        let size = a.iter().chain(b).map(|c| f64::from(c.abs().max_element())).fold(0.0, f64::max);
+        assert!((nearest.distance - due).abs() <= size * 2.0_f64.powi(-44), "{}: {nearest:?} for {due}", id(case));
+        assert_eq!(nearest.distance == 0.0, case["expect"]["intersects"] == true, "{}", id(case));
     }
 }
 

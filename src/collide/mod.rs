@@ -3,6 +3,9 @@
 //! | question | answer | guarantee |
 //! |---|---|---|
 //! | [`triangles_meet`], [`triangle_contact`] | whether two closed triangles share a point, and which | exact for every finite input |
+//! | [`triangle_meets_box`] | whether a triangle touches a box | exact |
+//! | [`triangle_meets_sphere`], [`triangle_meets_capsule`] | whether it touches a ball or a capsule | in f64 |
+//! | [`closest_on_triangle`], [`triangle_distance`] | nearest points | in f64; 0 exactly for triangles that meet |
 //! | [`boxes_meet`], [`box_pairs`] | which closed boxes share a point | exact, infinite bounds included |
 //! | [`sweep_box`] | when a moving box first touches one at rest | exact decision, times within 2^-51 |
 //! | [`ray_box`] | where a ray enters and leaves a closed box | exact decision, parameters within 2^-51 |
@@ -13,10 +16,14 @@
 //! mathematics.
 
 mod boxes;
+mod closest;
 mod continuous;
+mod overlap;
 mod predicates;
 mod triangles;
 
 pub use boxes::{Passage, box_pairs, boxes_meet, ray_box, sweep_box};
+pub use closest::{Nearest, closest_on_triangle, triangle_distance};
 pub use continuous::{Continuous, Impact};
+pub use overlap::{triangle_meets_box, triangle_meets_capsule, triangle_meets_sphere};
 pub use triangles::{TriangleContact, triangle_contact, triangles_meet};

@@ -21,6 +21,31 @@ pub(super) fn sign(value: f64) -> Sign {
 
 /// The sign of `(a - d) . ((b - d) x (c - d))`: on which side of the plane through a, b, c the point d lies. 0 on it, and for a, b, c on one line.
 pub(super) fn side(a: Vec3, b: Vec3, c: Vec3, d: Vec3) -> Sign {
+    let [p, q, r] = [a, b, c].map(|x| x.as_dvec3() - d.as_dvec3());
+    let volume = p.dot(q.cross(r));
+    // The bound of `Plane::height` with the roles of the points turned round.
+    if volume.abs() > BOUND * p.abs().max_element() * norm1(q) * norm1(r) {
+        return sign(volume);
+    }
+    side_exactly(a, b, c, d)
+}
+
+fn norm1(e: DVec3) -> f64 {
+    e.x.abs() + e.y.abs() + e.z.abs()
+}
+
+/// Four points that share a coordinate, or two of which are one, lie in a plane: meshes are full of them.
+fn plainly_flat(a: Vec3, b: Vec3, c: Vec3, d: Vec3) -> bool {
+    let flat = d.cmpeq(a) & d.cmpeq(b) & d.cmpeq(c);
+    flat.any() || d == a || d == b || d == c
+}
+
+#[cold]
+#[inline(never)]
+fn side_exactly(a: Vec3, b: Vec3, c: Vec3, d: Vec3) -> Sign {
+    if plainly_flat(a, b, c, d) {
+        return 0;
+    }
     let coord = |p: Vec3| Coord3D { x: f64::from(p.x), y: f64::from(p.y), z: f64::from(p.z) };
     sign(robust::orient3d(coord(a), coord(b), coord(c), coord(d)))
 }
@@ -38,7 +63,6 @@ impl Plane {
     pub(super) fn new(corners: [Vec3; 3]) -> Self {
         let [a, b, c] = corners.map(Vec3::as_dvec3);
         let (e1, e2) = (b - a, c - a);
-        let norm1 = |e: DVec3| e.x.abs() + e.y.abs() + e.z.abs();
         Self { corners, normal: e2.cross(e1), reach: BOUND * norm1(e1) * norm1(e2) }
     }
 
@@ -62,13 +86,13 @@ impl Plane {
             return sign(height);
         }
         let [a, b, c] = self.corners;
-        side(a, b, c, d)
+        side_exactly(a, b, c, d)
     }
 
-    /// Where the segment from `p` to `q`, which lie strictly on opposite sides, crosses the plane: 0 at `p`, 1 at `q`; within 2^-40.
+    /// Where the segment from `p` to `q`, which lie strictly on opposite sides, crosses the plane: 0 at `p`, 1 at `q`; within 2^-32.
     pub(super) fn crossing(&self, p: Vec3, q: Vec3) -> f64 {
         let ((hp, ep), (hq, eq)) = (self.height(p), self.height(q));
-        if (ep + eq) * TWO_42 <= (hp - hq).abs() {
+        if (ep + eq) * TWO_34 <= (hp - hq).abs() {
             return hp / (hp - hq);
         }
         let (hp, hq) = (volume(self.corners, p), volume(self.corners, q));
@@ -76,8 +100,8 @@ impl Plane {
     }
 }
 
-/// 2^42.
-const TWO_42: f64 = 4_398_046_511_104.0;
+/// 2^34.
+const TWO_34: f64 = 17_179_869_184.0;
 
 /// A projection along an axis: 2D coordinates are the other two components.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -95,14 +119,22 @@ impl Projection {
         sign(robust::orient2d(coord(a), coord(b), coord(c)))
     }
 
-    /// Where the segment from `p` to `q`, which lie strictly on opposite sides, crosses the line through `a` and `b`: within 2^-40.
+    /// Where the segment from `p` to `q`, which lie strictly on opposite sides, crosses the line through `a` and `b`: within 2^-32.
     pub(super) fn crossing(self, a: Vec3, b: Vec3, p: Vec3, q: Vec3) -> f64 {
-        let (ap, aq) = (self.area(a, b, p), self.area(a, b, q));
+        let ((ap, ep), (aq, eq)) = (self.area(a, b, p), self.area(a, b, q));
+        if (ep + eq) * TWO_34 <= (ap - aq).abs() {
+            return ap / (ap - aq);
+        }
+        let exactly = |c: Vec3| area([a, b, c].map(|p| [p[self.x], p[self.y]]));
+        let (ap, aq) = (exactly(p), exactly(q));
         ap / (ap - aq)
     }
 
-    fn area(self, a: Vec3, b: Vec3, c: Vec3) -> f64 {
-        area([a, b, c].map(|p| [p[self.x], p[self.y]]))
+    /// Twice the signed area, and a bound on its error: differences, products and their difference make 4 ε of the products' size.
+    fn area(self, a: Vec3, b: Vec3, c: Vec3) -> (f64, f64) {
+        let (ab, ac) = (b.as_dvec3() - a.as_dvec3(), c.as_dvec3() - a.as_dvec3());
+        let (left, right) = (ab[self.x] * ac[self.y], ab[self.y] * ac[self.x]);
+        (left - right, BOUND * (left.abs() + right.abs()))
     }
 
     /// The projection in which a, b, c have an area, the best one by `normal` first; `None` for points on one line.

@@ -2,10 +2,7 @@ use std::cmp::Ordering;
 
 use glam::DVec3;
 
-use super::{
-    Impact,
-    map::{Map, range},
-};
+use super::map::{Map, range};
 
 /// A box of parameters in which a contact may lie.
 #[derive(Clone, Copy, Debug)]
@@ -15,19 +12,16 @@ pub(super) struct Cell {
     v: [f64; 2],
     /// How far the map's values reach over the cell, roughly.
     size: f64,
-    /// Distance at the start, at the middle of u and v, rounded up; infinite before it is known.
-    gap: f64,
-    reached: bool,
+    /// Too small for f64 to say more.
+    spent: bool,
 }
 
 /// What became of a cell.
 pub(super) enum Fate {
     /// No contact in it.
     Empty,
-    /// The distance at its start is within the tolerance, or cannot be told from it.
-    Reached(Cell),
-    /// Both halves are still open.
-    Split(Cell, Cell),
+    /// It has shrunk, or is half of what it was and the other half comes with it.
+    Open(Cell, Option<Cell>),
 }
 
 /// A parameter is known to no better than this.
@@ -39,50 +33,41 @@ const SHRUNK: f64 = 0.6;
 impl Cell {
     /// All parameters.
     pub(super) const ALL: Self =
-        Self { t: [0.0, 1.0], u: [0.0, 1.0], v: [0.0, 1.0], size: f64::INFINITY, gap: f64::INFINITY, reached: false };
+        Self { t: [0.0, 1.0], u: [0.0, 1.0], v: [0.0, 1.0], size: f64::INFINITY, spent: false };
 
+    /// Its least t.
     pub(super) fn begins(&self) -> f64 {
         self.t[0]
     }
 
-    pub(super) fn impact(&self, map: &Map) -> Impact {
-        let gap = map.unscaled(self.gap);
-        let place = [self.u, self.v].map(|[from, to]| from + 0.5 * (to - from));
-        Impact { time: self.t[0], gap, place }
+    pub(super) fn is_spent(&self) -> bool {
+        self.spent
     }
 
-    /// Drops, shrinks, finishes or splits the cell.
-    pub(super) fn work(mut self, map: &Map, separation: f64, tolerance: f64) -> Fate {
-        if self.reached {
-            return Fate::Reached(self);
+    /// Drops, shrinks or splits the cell.
+    pub(super) fn work(mut self, map: &Map, separation: f64) -> Fate {
+        let values = Values(map.over(self.t, self.u, self.v));
+        if values.miss_along_axes(map, separation) {
+            return Fate::Empty;
         }
-        loop {
-            let values = Values(map.over(self.t, self.u, self.v));
-            if values.miss_along_axes(map, separation) {
-                return Fate::Empty;
-            }
-            let slopes = values.slopes();
-            let widths = slopes.map(|s| s.abs().max_element());
-            self.size = widths[0].max(widths[1]).max(widths[2]);
-            self.gap = (values.at_start().length() + map.error.element_sum()) * (1.0 + 8.0 * f64::EPSILON);
-            self.reached = self.gap <= separation + tolerance || self.is_spent(map);
-            let Some(cuts) = values.cuts(map, separation, slopes) else { return Fate::Empty };
-            if self.reached {
-                // Only now: a contact that the directions rule out is none.
-                return Fate::Reached(self);
-            }
-            if cuts.share() > SHRUNK {
-                let (near, far) = self.halved(widths);
-                return Fate::Split(near, far);
-            }
-            self.shrink(&cuts);
+        let slopes = values.slopes();
+        let widths = slopes.map(|s| s.abs().max_element());
+        self.size = widths[0].max(widths[1]).max(widths[2]);
+        let Some(cuts) = values.cuts(map, separation, slopes) else { return Fate::Empty };
+        let before = self.volume();
+        self.shrink(&cuts);
+        if self.volume() <= SHRUNK * before {
+            return Fate::Open(self, None);
+        }
+        self.spent = self.size <= 2.0 * map.error.max_element();
+        match self.halved(widths).filter(|_| !self.spent) {
+            Some((near, far)) => Fate::Open(near, Some(far)),
+            None => Fate::Open(Self { spent: true, ..self }, None),
         }
     }
 
-    /// Too small for f64 to say more.
-    fn is_spent(&self, map: &Map) -> bool {
-        let fine = |[from, to]: [f64; 2]| to - from <= 16.0 * GRAIN;
-        self.size <= 2.0 * map.error.max_element() || (fine(self.t) && fine(self.u) && fine(self.v))
+    fn volume(&self) -> f64 {
+        [self.t, self.u, self.v].iter().map(|[from, to]| to - from).product()
     }
 
     fn shrink(&mut self, cuts: &Cuts) {
@@ -98,21 +83,20 @@ impl Cell {
         }
     }
 
-    /// Halves along the parameter that moves the values most.
-    fn halved(self, widths: [f64; 3]) -> (Self, Self) {
+    /// Halves along the parameter that moves the values most, of those that can be halved.
+    fn halved(self, widths: [f64; 3]) -> Option<(Self, Self)> {
+        let ranges = [self.t, self.u, self.v];
+        let wide = (0..3).filter(|&i| ranges[i][1] - ranges[i][0] > 8.0 * GRAIN);
+        let widest = wide.reduce(|best, i| if widths[i] > widths[best] { i } else { best })?;
+        let [from, to] = ranges[widest];
+        let middle = from + 0.5 * (to - from);
         let (mut near, mut far) = (self, self);
-        let [t, u, v] = widths;
-        let (near_range, far_range) = if t >= u && t >= v {
-            (&mut near.t, &mut far.t)
-        } else if u >= v {
-            (&mut near.u, &mut far.u)
-        } else {
-            (&mut near.v, &mut far.v)
-        };
-        let middle = near_range[0] + 0.5 * (near_range[1] - near_range[0]);
-        near_range[1] = middle;
-        far_range[0] = middle;
-        (near, far)
+        match widest {
+            0 => (near.t[1], far.t[0]) = (middle, middle),
+            1 => (near.u[1], far.u[0]) = (middle, middle),
+            _ => (near.v[1], far.v[0]) = (middle, middle),
+        }
+        Some((near, far))
     }
 }
 
@@ -142,11 +126,6 @@ struct Cuts([[f64; 2]; 3]);
 
 impl Cuts {
     const NONE: Self = Self([[0.0, 1.0]; 3]);
-
-    /// What is left of the cell.
-    fn share(&self) -> f64 {
-        self.0.iter().map(|[from, to]| to - from).product()
-    }
 }
 
 /// The map's values at a cell's corners.

@@ -1,4 +1,12 @@
+#![expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "exponents of f64 are small, and positive once biased"
+)]
+
 use glam::DVec3;
+
+use super::Impact;
 
 /// The vector from the one to the other, affine in each of t, u, v in [0, 1]: by its values at the corners of the cube.
 ///
@@ -10,6 +18,7 @@ pub(super) struct Map {
     pub(super) error: DVec3,
     /// Lengths were multiplied by this power of two.
     scale: f64,
+    is_face: bool,
 }
 
 /// With ε = 2^-53 and C the largest size of a component at the corners of the cube: a corner is a rounded difference, off by 1 ε C; each of
@@ -18,38 +27,40 @@ pub(super) struct Map {
 /// the rounding of the bounds themselves.
 const ERROR: f64 = 32.0 * (f64::EPSILON / 2.0);
 
-/// Far above what underflow can do, far below what matters: the greatest corner is above 2^-200.
+/// Far above what underflow can do, far below what matters: the greatest corner is above 2^-80.
 const FLOOR: f64 = 1e-150;
 
 impl Map {
     pub(super) fn vertex_face(start: &[DVec3; 4], end: &[DVec3; 4]) -> Option<Self> {
         let at = |&[p, a, b, c]: &[DVec3; 4]| [p - a, p - a, p - b, p - c];
-        Self::new(start, end, at)
+        Self::new(start, end, true, at)
     }
 
     pub(super) fn edge_edge(start: &[DVec3; 4], end: &[DVec3; 4]) -> Option<Self> {
         let at = |&[a0, a1, b0, b1]: &[DVec3; 4]| [a0 - b0, a0 - b1, a1 - b0, a1 - b1];
-        Self::new(start, end, at)
+        Self::new(start, end, false, at)
     }
 
-    fn new(start: &[DVec3; 4], end: &[DVec3; 4], at: impl Fn(&[DVec3; 4]) -> [DVec3; 4]) -> Option<Self> {
+    fn new(
+        start: &[DVec3; 4],
+        end: &[DVec3; 4],
+        is_face: bool,
+        at: impl Fn(&[DVec3; 4]) -> [DVec3; 4],
+    ) -> Option<Self> {
+        // Differences must not overflow.
         let largest = start.iter().chain(end).map(|p| p.abs().max_element()).fold(0.0, f64::max);
         if !start.iter().chain(end).all(|p| p.is_finite()) {
             return None;
         }
-        // Differences must not overflow.
         let first = if largest > HUGE { 1.0 / HUGE } else { 1.0 };
         let [start, end] = [start, end].map(|points| at(&points.map(|p| p * first)));
-        let mut map = Self { corners: [[0.0; 8]; 3], error: DVec3::ZERO, scale: first };
+        let mut map = Self { corners: [[0.0; 8]; 3], error: DVec3::ZERO, scale: first, is_face };
         for (i, value) in start.iter().chain(&end).enumerate() {
             for axis in 0..3 {
                 map.corners[axis][i] = value[axis];
             }
         }
-        let reach = map.reach().max_element();
-        if reach < TINY {
-            map.enlarge();
-        }
+        map.bring_near_one();
         map.error = map.reach() * ERROR + DVec3::splat(FLOOR);
         Some(map)
     }
@@ -60,11 +71,15 @@ impl Map {
         DVec3::new(largest(&self.corners[0]), largest(&self.corners[1]), largest(&self.corners[2]))
     }
 
-    /// Brings very small numbers to where products do not underflow.
-    fn enlarge(&mut self) {
-        self.scale *= HUGE;
-        for value in self.corners.iter_mut().flatten() {
-            *value *= HUGE;
+    /// Scales by a power of two, so that products of three components neither overflow nor underflow.
+    fn bring_near_one(&mut self) {
+        let exponent = exponent(self.reach().max_element());
+        if exponent.abs() > ORDINARY {
+            let factor = power_of_two((-exponent).clamp(-400, 1000));
+            self.scale *= factor;
+            for value in self.corners.iter_mut().flatten() {
+                *value *= factor;
+            }
         }
     }
 
@@ -73,9 +88,19 @@ impl Map {
         length * self.scale * (1.0 + 4.0 * f64::EPSILON)
     }
 
-    /// A length of this map in the caller's unit, rounded up.
-    pub(super) fn unscaled(&self, length: f64) -> f64 {
-        length / self.scale * (1.0 + 4.0 * f64::EPSILON)
+    pub(super) fn is_face(&self) -> bool {
+        self.is_face
+    }
+
+    /// An answer in the caller's unit of length.
+    pub(super) fn impact(&self, time: f64, gap: f64, place: [f64; 2]) -> Impact {
+        Impact { time, gap: gap / self.scale * (1.0 + 4.0 * f64::EPSILON), place }
+    }
+
+    /// Values at the corners of u and v, number `2 u + v`, at one t.
+    pub(super) fn at(&self, t: f64) -> [DVec3; 4] {
+        let corner = |i: usize| DVec3::new(self.corners[0][i], self.corners[1][i], self.corners[2][i]);
+        std::array::from_fn(|i| corner(i) + (corner(i + 4) - corner(i)) * t)
     }
 
     /// The cheap filter: true when boxes around both motions are further apart than `separation`.
@@ -102,11 +127,21 @@ impl Map {
     }
 }
 
-/// 2^600; a power of two.
-const HUGE: f64 = f64::from_bits((1023 + 600) << 52);
+/// 2^600.
+const HUGE: f64 = power_of_two(600);
 
-/// 2^-200.
-const TINY: f64 = f64::from_bits((1023 - 200) << 52);
+/// Exponents up to this need no scaling.
+const ORDINARY: i32 = 30;
+
+/// An exponent in the normal range.
+const fn power_of_two(exponent: i32) -> f64 {
+    f64::from_bits(((1023 + exponent) as u64) << 52)
+}
+
+/// The exponent of a number's leading bit; -1023 for 0 and subnormal numbers.
+fn exponent(value: f64) -> i32 {
+    ((value.to_bits() >> 52) & 0x7ff) as i32 - 1023
+}
 
 /// Narrows one parameter, whose bit in the corner number is `BIT`.
 #[inline(always)]

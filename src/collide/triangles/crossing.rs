@@ -26,6 +26,17 @@ pub(super) fn search(of: Of, shape: &Shape, sides: [Sign; 3], face: &[Vec3; 3], 
     }
 }
 
+/// Whether two triangles meet that reach through each other's plane; the first corner of each is alone on its side.
+///
+/// Both cut the planes' common line: A from where its edge to the second corner crosses the plane of B to where that to the third
+/// does, B likewise. The volume of an edge of A and one of B is 0 where they cross the line in one point, and else its sign is that
+/// of the order of both on the line, up to a sign that depends on the first corners' sides alone. So the two stretches are
+/// disjoint when all four volumes have one sign.
+pub(super) fn overlap_on_line([a, a1, a2]: [Vec3; 3], [b, b1, b2]: [Vec3; 3]) -> bool {
+    let first = side(a, a1, b, b1);
+    first == 0 || side(a, a1, b, b2) != first || side(a, a2, b, b1) != first || side(a, a2, b, b2) != first
+}
+
 /// Whether a face holds a point of its plane.
 fn holds(face: &[Vec3; 3], plane: &Plane, point: Vec3) -> bool {
     let [a, b, c] = *face;

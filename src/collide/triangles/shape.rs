@@ -10,6 +10,12 @@ pub(super) struct Shape {
 }
 
 impl Shape {
+    /// As [`Shape::new`], for a triangle that has an area unless it `may_be_flat`.
+    pub(super) fn of(corners: &[Vec3; 3], may_be_flat: bool) -> Self {
+        let [a, b, c] = *corners;
+        if may_be_flat { Self::new(*corners) } else { Self { corners: [(0, a), (1, b), (2, c)].into() } }
+    }
+
     pub(super) fn new(corners: [Vec3; 3]) -> Self {
         let [a, b, c] = corners;
         let all = [(0, a), (1, b), (2, c)];

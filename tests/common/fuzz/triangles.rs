@@ -27,7 +27,7 @@ fn triangles(bytes: &mut Bytes<'_>) -> [[Vec3; 3]; 2] {
 
 /// True when `p` is in `points`, up to the error that points may have.
 fn holds(points: &[DVec3], p: DVec3, size: f64) -> bool {
-    points.iter().any(|q| (*q - p).abs().max_element() <= size * 2.0_f64.powi(-37))
+    points.iter().any(|q| (*q - p).abs().max_element() <= size * 2.0_f64.powi(-30))
 }
 
 fn check_contact(due: &TriangleContact, contact: &TriangleContact, size: f64) {
