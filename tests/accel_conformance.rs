@@ -20,9 +20,22 @@ use kinora::{
 use trace::{Mesh, Random, closest, in_packets, occluded};
 
 fn build(kind: AccelKind, mesh: &Mesh) -> AnyAccel {
-    let accel = AccelSpec::new(kind).build(&mesh.prims()).expect("the mesh builds");
-    accel.validate(&mesh.prims()).unwrap_or_else(|v| panic!("{kind}: {v:?}"));
+    build_spec(&AccelSpec::new(kind), mesh)
+}
+
+fn build_spec(spec: &AccelSpec, mesh: &Mesh) -> AnyAccel {
+    let accel = spec.build(&mesh.prims()).expect("the mesh builds");
+    accel.validate(&mesh.prims()).unwrap_or_else(|v| panic!("{spec}: {v:?}"));
     accel
+}
+
+/// Forms of structures beside the default ones, with kernels of their own.
+const FORMS: [&str; 2] = ["ssh:planes=3", "ssh:planes=4"];
+
+/// Every structure but `list`, and the other forms.
+fn specs() -> Vec<AccelSpec> {
+    let kinds = AccelKind::ALL.iter().filter(|&&k| k != AccelKind::List).map(|&k| AccelSpec::new(k));
+    kinds.chain(FORMS.map(|form| form.parse().expect("known settings"))).collect()
 }
 
 /// The mesh with every vertex elsewhere: what a refit starts from.
@@ -40,10 +53,10 @@ fn bits(hit: Option<Hit>) -> Option<[u32; 4]> {
 fn conforms(name: &str, mesh: &Mesh, rays: &[Ray]) {
     let list = build(AccelKind::List, mesh);
     let due: Vec<_> = closest(&list, &mesh.prims(), rays, SimdLevel::Scalar).into_iter().map(bits).collect();
-    for &kind in AccelKind::ALL.iter().filter(|&&k| k != AccelKind::List) {
-        let fresh = build(kind, mesh);
+    for kind in &specs() {
+        let fresh = build_spec(kind, mesh);
         let elsewhere = displaced(mesh);
-        let old = build(kind, &elsewhere);
+        let old = build_spec(kind, &elsewhere);
         let mut refitted = old.clone();
         let refit = old.refit_into(&mut refitted, &mesh.prims());
         if refit == Refit::Done {

@@ -84,7 +84,14 @@ fn answers(accel: &AnyAccel, prims: &Triangles<'_>, rays: &[Ray]) -> Vec<Option<
 fn three_hundred_refits_answer_as_brute_force() {
     let rays = rays(12, 1);
     let first = sheet(9, 0.0);
-    let specs = ["ssh", "ssh:leaf=1,build=median", "ssh:refit=rechoose,leaf=2", "ssh:leaf_planes=off"];
+    let specs = [
+        "ssh",
+        "ssh:leaf=1,build=median",
+        "ssh:refit=rechoose,leaf=2",
+        "ssh:leaf_planes=off",
+        "ssh:planes=3",
+        "ssh:planes=4,refit=rechoose",
+    ];
     let mut accels = specs.map(|spec| {
         let accel = build(spec, &first.prims());
         (accel.clone(), accel)
@@ -119,6 +126,10 @@ fn settings_change_no_answer() {
         "ssh:leaf_planes=off",
         "ssh:leaf_planes=off,leaf=1",
         "ssh:bins=2,leaf=3",
+        "ssh:planes=3",
+        "ssh:planes=4",
+        "ssh:planes=3,leaf=32,build=median",
+        "ssh:planes=4,leaf=1,leaf_planes=off",
     ] {
         let accel = build(spec, &mesh.prims());
         for level in SimdLevel::available() {
@@ -134,6 +145,7 @@ fn settings_change_no_answer() {
 fn unknown_settings_are_refused() {
     let error = |spec: &str| spec.parse::<AccelSpec>().unwrap_err().to_string();
     assert_eq!(error("ssh:build=fast"), "ssh: setting `build`: `fast` is not one of sah, median");
+    assert_eq!(error("ssh:planes=6"), "ssh: setting `planes`: `6` is not one of 1, 3, 4");
     assert_eq!(error("ssh:leaf=0"), "ssh: setting `leaf`: `0` is not a number from 1 to 32");
     assert_eq!(error("ssh:leaf_planes=1"), "ssh: setting `leaf_planes`: `1` is not one of on, off");
     assert_eq!(error("ssh:refit=always"), "ssh: setting `refit`: `always` is not one of keep, rechoose");
@@ -167,7 +179,13 @@ fn sides_chosen_anew_bound_tighter_after_motion() {
 #[test]
 fn refits_do_not_depend_on_the_number_of_threads() {
     let (mesh, moved) = (sheet(110, 0.0), sheet(110, 0.5));
-    for spec in ["ssh:leaf=2", "ssh:leaf=1,build=median", "ssh:leaf=2,refit=rechoose"] {
+    for spec in [
+        "ssh:leaf=2",
+        "ssh:leaf=1,build=median",
+        "ssh:leaf=2,refit=rechoose",
+        "ssh:planes=3,leaf=2",
+        "ssh:planes=4,leaf=1,refit=rechoose",
+    ] {
         let accel = build(spec, &mesh.prims());
         let in_pool = |threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");

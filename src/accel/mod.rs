@@ -4,6 +4,7 @@ mod batch;
 mod block;
 mod boxes;
 pub mod bvh2;
+pub mod bvh8;
 mod counter;
 pub mod events;
 pub mod grid;
@@ -19,6 +20,7 @@ mod sah;
 mod shapes;
 pub mod ssh;
 mod topology;
+mod wide;
 
 pub use boxes::Visitor;
 pub use counter::ReadCounter;

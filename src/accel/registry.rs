@@ -5,6 +5,7 @@ use std::{fmt, str::FromStr};
 use super::{
     Accel, AccelConfig, AccelStats, BuildError, Closest, Counter, HitSink, Refit, TravRay, Violation,
     bvh2::Bvh2,
+    bvh8::Bvh8,
     events::Events,
     grid::Grid,
     grug::Grug,
@@ -246,6 +247,8 @@ register_accels! {
     List => List,
     /// Binary hierarchy of boxes.
     Bvh2 => Bvh2,
+    /// Hierarchy of boxes with eight children a node.
+    Bvh8 => Bvh8,
     /// Uniform grid.
     Grid => Grid,
     /// Kd-tree.

@@ -10,8 +10,16 @@ use super::{SimdLevel, Task};
 pub trait Simd: Copy + Send + Sync + 'static {
     /// The level that the implementor stands for.
     const LEVEL: SimdLevel;
+    /// True when [`Lanes::mul_add_loose`] rounds once.
+    const FUSED: bool;
     /// Four f32: the planes of two sibling boxes on one axis.
     type F4: Halves;
+    /// Eight f32: a plane of each of eight boxes.
+    type F8: Lanes<Elem = f32>;
+    /// Eight words beside them.
+    type U8: Copy + Debug;
+    /// A choice among eight lanes.
+    type M8: Copy + Debug;
     /// Four f64: a block of four triangles.
     type D4: Lanes<Elem = f64>;
     /// The widest f32: one lane a ray of a packet.
@@ -24,6 +32,24 @@ pub trait Simd: Copy + Send + Sync + 'static {
 
     /// The first numbers of a slice as f64, exactly. Panics when it is too short.
     fn load_wide(from: &[f32]) -> Self::D;
+
+    /// Eight words.
+    fn words(from: &[u32; 8]) -> Self::U8;
+
+    /// The words with the bits of `flips` inverted in all of them.
+    fn flipped(words: Self::U8, flips: u32) -> Self::U8;
+
+    /// Lanes whose word has bit `31 - LEFT`.
+    fn with_bit<const LEFT: i32>(words: Self::U8) -> Self::M8;
+
+    /// [`Lanes::max`] in the chosen lanes, `b` elsewhere.
+    fn max_where(chosen: Self::M8, a: Self::F8, b: Self::F8) -> Self::F8;
+
+    /// `b` in the chosen lanes, [`Lanes::min`] elsewhere.
+    fn min_unless(chosen: Self::M8, a: Self::F8, b: Self::F8) -> Self::F8;
+
+    /// In each lane the number of `table` whose place is in the word's three bits from bit `RIGHT` on.
+    fn picked<const RIGHT: i32>(table: Self::F8, words: Self::U8) -> Self::F8;
 
     /// Runs `task` in a function of its own, compiled for this level once for all callers: for work that is worth a
     /// call but not a copy at every call site.

@@ -11,7 +11,11 @@ pub struct Scalar;
 
 impl Simd for Scalar {
     const LEVEL: SimdLevel = SimdLevel::Scalar;
+    const FUSED: bool = false;
     type F4 = Array<f32, 4>;
+    type F8 = Array<f32, 8>;
+    type U8 = [u32; 8];
+    type M8 = u32;
     type D4 = Array<f64, 4>;
     type F = Array<f32, 8>;
     type D = Array<f64, 4>;
@@ -25,6 +29,36 @@ impl Simd for Scalar {
     fn load_wide(from: &[f32]) -> Self::D {
         let from = &from[..4];
         Array(array::from_fn(|i| f64::from(from[i])))
+    }
+
+    #[inline(always)]
+    fn words(from: &[u32; 8]) -> [u32; 8] {
+        *from
+    }
+
+    #[inline(always)]
+    fn flipped(words: [u32; 8], flips: u32) -> [u32; 8] {
+        words.map(|word| word ^ flips)
+    }
+
+    #[inline(always)]
+    fn with_bit<const LEFT: i32>(words: [u32; 8]) -> u32 {
+        words.iter().rev().fold(0, |mask, word| mask << 1 | word << LEFT >> 31)
+    }
+
+    #[inline(always)]
+    fn max_where(chosen: u32, a: Self::F8, b: Self::F8) -> Self::F8 {
+        Lanes::select(chosen, a.max(b), b)
+    }
+
+    #[inline(always)]
+    fn min_unless(chosen: u32, a: Self::F8, b: Self::F8) -> Self::F8 {
+        Lanes::select(chosen, b, a.min(b))
+    }
+
+    #[inline(always)]
+    fn picked<const RIGHT: i32>(table: Self::F8, words: [u32; 8]) -> Self::F8 {
+        Array(words.map(|word| table.0[(word >> RIGHT & 7) as usize]))
     }
 
     #[inline(never)]

@@ -65,6 +65,8 @@ impl Task for Operations<'_> {
         add(bits32(&rows).collect(), below, at_most);
         let (rows, below, at_most) = each::<S::F4>(self.a, self.b, 0.0);
         add(bits32(&rows).collect(), below, at_most);
+        let (rows, below, at_most) = each::<S::F8>(self.a, self.b, 0.0);
+        add(bits32(&rows).collect(), below, at_most);
         let (rows, below, at_most) = each::<S::D>(self.wide.0, self.wide.1, 0.0);
         add(bits64(&rows).collect(), below, at_most);
         let (rows, below, at_most) = each::<S::D4>(self.wide.0, self.wide.1, 0.0);
@@ -82,6 +84,21 @@ impl Task for Operations<'_> {
         let mut wide = [0.0; 4];
         S::widen(four).store(&mut wide);
         out.extend(bits64(&wide));
+        let words: [u32; 8] = std::array::from_fn(|i| self.b[i].to_bits());
+        let words = S::flipped(S::words(&words), 0x0820_0000);
+        let (a, b) = (S::F8::load(self.a), S::F8::load(&self.a[8..]));
+        let (chosen, other) = (S::with_bit::<0>(words), S::with_bit::<4>(words));
+        let rows = [
+            S::max_where(chosen, a, b),
+            S::min_unless(other, a, b),
+            S::picked::<25>(a, words),
+            S::picked::<29>(b, words),
+        ];
+        for lanes in rows {
+            let mut row = [0.0; 8];
+            lanes.store(&mut row);
+            out.extend(bits32(&row));
+        }
         let mut wide = [0.0; 16];
         for first in (0..16).step_by(S::D::LEN) {
             S::load_wide(&self.a[first..]).store(&mut wide[first..]);

@@ -29,7 +29,11 @@ pub(super) struct Avx512;
 
 impl Simd for Avx2 {
     const LEVEL: SimdLevel = SimdLevel::Avx2;
+    const FUSED: bool = true;
     type F4 = F32x4;
+    type F8 = F32x8;
+    type U8 = __m256i;
+    type M8 = __m256;
     type D4 = F64x4;
     type F = F32x8;
     type D = F64x4;
@@ -45,6 +49,37 @@ impl Simd for Avx2 {
     }
 
     #[inline(always)]
+    fn words(from: &[u32; 8]) -> __m256i {
+        load_words(from)
+    }
+
+    #[inline(always)]
+    fn flipped(words: __m256i, flips: u32) -> __m256i {
+        call!(_mm256_xor_si256(words, call!(_mm256_set1_epi32(flips.cast_signed()))))
+    }
+
+    #[inline(always)]
+    fn with_bit<const LEFT: i32>(words: __m256i) -> __m256 {
+        call!(_mm256_castsi256_ps(call!(_mm256_slli_epi32::<LEFT>(words))))
+    }
+
+    #[inline(always)]
+    fn max_where(chosen: __m256, a: F32x8, b: F32x8) -> F32x8 {
+        F32x8(call!(_mm256_blendv_ps(b.0, a.max(b).0, chosen)))
+    }
+
+    #[inline(always)]
+    fn min_unless(chosen: __m256, a: F32x8, b: F32x8) -> F32x8 {
+        F32x8(call!(_mm256_blendv_ps(a.min(b).0, b.0, chosen)))
+    }
+
+    #[inline(always)]
+    fn picked<const RIGHT: i32>(table: F32x8, words: __m256i) -> F32x8 {
+        // Bits above the lowest three do not count.
+        F32x8(call!(_mm256_permutevar8x32_ps(table.0, call!(_mm256_srli_epi32::<RIGHT>(words)))))
+    }
+
+    #[inline(always)]
     fn call<T: Task>(task: T) -> T::Output {
         // SAFETY: the type is private to this module, so code names it only below a dispatch that found its features.
         unsafe { call_avx2(task) }
@@ -53,7 +88,11 @@ impl Simd for Avx2 {
 
 impl Simd for Avx512 {
     const LEVEL: SimdLevel = SimdLevel::Avx512;
+    const FUSED: bool = true;
     type F4 = F32x4;
+    type F8 = F32x8;
+    type U8 = __m256i;
+    type M8 = __mmask8;
     type D4 = F64x4;
     type F = F32x16;
     type D = F64x8;
@@ -69,6 +108,40 @@ impl Simd for Avx512 {
     }
 
     #[inline(always)]
+    fn words(from: &[u32; 8]) -> __m256i {
+        load_words(from)
+    }
+
+    #[inline(always)]
+    fn flipped(words: __m256i, flips: u32) -> __m256i {
+        call!(_mm256_xor_si256(words, call!(_mm256_set1_epi32(flips.cast_signed()))))
+    }
+
+    #[inline(always)]
+    fn with_bit<const LEFT: i32>(words: __m256i) -> __mmask8 {
+        call!(_mm256_test_epi32_mask(
+            words,
+            call!(_mm256_set1_epi32(i32::MIN.cast_unsigned().wrapping_shr(LEFT.cast_unsigned()).cast_signed()))
+        ))
+    }
+
+    #[inline(always)]
+    fn max_where(chosen: __mmask8, a: F32x8, b: F32x8) -> F32x8 {
+        F32x8(call!(_mm256_mask_max_ps(b.0, chosen, a.0, b.0)))
+    }
+
+    #[inline(always)]
+    fn min_unless(chosen: __mmask8, a: F32x8, b: F32x8) -> F32x8 {
+        F32x8(call!(_mm256_mask_min_ps(b.0, !chosen, a.0, b.0)))
+    }
+
+    #[inline(always)]
+    fn picked<const RIGHT: i32>(table: F32x8, words: __m256i) -> F32x8 {
+        // Bits above the lowest three do not count.
+        F32x8(call!(_mm256_permutevar8x32_ps(table.0, call!(_mm256_srli_epi32::<RIGHT>(words)))))
+    }
+
+    #[inline(always)]
     fn call<T: Task>(task: T) -> T::Output {
         // SAFETY: the type is private to this module, so code names it only below a dispatch that found its features.
         unsafe { call_avx512(task) }
@@ -79,6 +152,12 @@ impl Simd for Avx512 {
 fn widen(narrow: F32x4) -> F64x4 {
     // SAFETY: AVX is in the level (module head).
     F64x4(unsafe { _mm256_cvtps_pd(narrow.0) })
+}
+
+#[inline(always)]
+fn load_words(from: &[u32; 8]) -> __m256i {
+    // SAFETY: the array is as long as the unaligned load; AVX is in the level (module head).
+    unsafe { _mm256_loadu_si256(from.as_ptr().cast()) }
 }
 
 /// Comparison into a bit mask, by vector compare and move or by mask register.

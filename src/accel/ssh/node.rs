@@ -37,8 +37,19 @@ impl Side {
     /// Rows of a table by [`Side::row`].
     pub(super) const ROWS: usize = 8;
 
-    const fn new(axis: u32, upper: bool) -> Self {
+    pub(super) const fn new(axis: u32, upper: bool) -> Self {
         Self(axis | if upper { UPPER } else { 0 })
+    }
+
+    /// The side of a [`Side::row`].
+    #[inline(always)]
+    pub(super) fn of_bits(bits: u32) -> Self {
+        Self(bits)
+    }
+
+    /// The other side of the axis.
+    pub(super) fn opposite(self) -> Self {
+        Self(self.0 ^ UPPER)
     }
 
     #[inline(always)]

@@ -1,7 +1,7 @@
 use arrayvec::ArrayVec;
 
 use super::{
-    Ssh,
+    narrow::Narrow,
     node::{Node, Side, Word},
     traverse::{SLACK, predicted},
 };
@@ -9,10 +9,11 @@ use crate::{
     accel::{
         Closest, Counter, HitSink, TravRay,
         block::TriBlock,
-        packet::{PACKET, PacketRays, bits},
+        packet::{PACKET, PacketRays},
         query::{GROW, SHRINK},
         run,
         topology::MAX_DEPTH,
+        wide::packet::group,
     },
     geom::{Aabb, Triangles},
     simd::{Halves, Lanes, Simd},
@@ -24,33 +25,33 @@ const FEW: u32 = 3;
 /// Rays of common direction signs, one to a lane, against single planes. The proof at `FastSlabs` holds lane by lane, with the slack added
 /// to exits and limits, where it costs no instruction: that rounds once more at most, which the widening of exits covers. Lanes of rays with
 /// other signs hold nonsense and are masked.
-struct PacketSlabs<S: Simd> {
+pub(super) struct PacketSlabs<S: Simd> {
     origin: [S::F; 3],
     /// By [`Side::row`]: factors for entries and exits, NaN for those that are not.
     entry: [S::F; Side::ROWS],
     exit: [S::F; Side::ROWS],
     backward: [bool; 3],
     t_near: S::F,
-    limit: S::F,
+    pub(super) limit: S::F,
 }
 
 /// The part of each ray inside a node.
 #[derive(Clone, Copy)]
-struct Segments<S: Simd> {
-    near: S::F,
-    far: S::F,
+pub(super) struct Segments<S: Simd> {
+    pub(super) near: S::F,
+    pub(super) far: S::F,
 }
 
 impl<S: Simd> Segments<S> {
     #[inline(always)]
-    fn open(self) -> u32 {
+    pub(super) fn open(self) -> u32 {
         self.near.le(self.far)
     }
 }
 
 impl<S: Simd> PacketSlabs<S> {
     #[inline(always)]
-    fn new(packet: &PacketRays, backward: [bool; 3]) -> Self {
+    pub(super) fn new(packet: &PacketRays, backward: [bool; 3]) -> Self {
         let nan = S::F::splat(f32::NAN);
         let row = |rows: &[[f32; PACKET]; 3], axis: usize| S::F::load(&rows[axis]);
         let origin = [row(&packet.origin32, 0), row(&packet.origin32, 1), row(&packet.origin32, 2)];
@@ -77,7 +78,7 @@ impl<S: Simd> PacketSlabs<S> {
     }
 
     #[inline(always)]
-    fn cut(&self, plane: f32, side: Side, segments: Segments<S>) -> Segments<S> {
+    pub(super) fn cut(&self, plane: f32, side: Side, segments: Segments<S>) -> Segments<S> {
         let distance = S::F::splat(plane) - self.origin[side.axis()];
         Segments {
             near: (distance * self.entry[side.row()]).max(segments.near),
@@ -116,7 +117,7 @@ impl<S: Simd> PacketSlabs<S> {
 
     /// Rays that may meet the box around the triangles of a block, or around one of them.
     #[inline(always)]
-    fn meeting(&self, block: &TriBlock, lane: Option<usize>, mut segments: Segments<S>) -> u32 {
+    pub(super) fn meeting(&self, block: &TriBlock, lane: Option<usize>, mut segments: Segments<S>) -> u32 {
         let planes = box_of::<S>(block, lane);
         for side in Side::ALL {
             segments = self.cut(planes[side.axis()][usize::from(side.is_upper())], side, segments);
@@ -125,7 +126,7 @@ impl<S: Simd> PacketSlabs<S> {
     }
 
     #[inline(always)]
-    fn clipped(&self, bounds: &Aabb) -> Segments<S> {
+    pub(super) fn clipped(&self, bounds: &Aabb) -> Segments<S> {
         let mut segments = Segments { near: self.t_near, far: self.limit };
         for side in Side::ALL {
             segments = self.cut(side.of(bounds), side, segments);
@@ -178,23 +179,7 @@ struct Entry<S: Simd> {
 /// Nodes to visit; at most one a level, and the builder bounds the depth.
 type Stack<S> = ArrayVec<Entry<S>, MAX_DEPTH>;
 
-/// The first of the rays in `left` and all others of the same direction signs; rays that are not ordinary stand alone.
-#[inline(always)]
-fn group(ssh: &Ssh, rays: &[TravRay], left: u32) -> (u32, [bool; 3]) {
-    let signs = |ray: &TravRay| ray.range().dir.to_array().map(|d| d < 0.0);
-    let leader = left.trailing_zeros() as usize;
-    let due = signs(&rays[leader]);
-    if !ssh.is_ordinary(&rays[leader]) {
-        return (1 << leader, due);
-    }
-    let mut members = 0;
-    for i in bits(left) {
-        members |= u32::from(ssh.is_ordinary(&rays[i]) && signs(&rays[i]) == due) << i;
-    }
-    (members, due)
-}
-
-impl Ssh {
+impl Narrow {
     #[inline(always)]
     pub(super) fn walk_closest_packet<S: Simd, C: Counter, K: HitSink>(
         &self,
@@ -210,7 +195,7 @@ impl Ssh {
             let (rays, best, sinks) = (&rays[start..end], &mut best[start..end], &sinks[start..end]);
             let mut left = (active >> start) & ((1 << rays.len()) - 1);
             while left != 0 {
-                let (members, backward) = group(self, rays, left);
+                let (members, backward) = group(|ray| self.is_ordinary(ray), rays, left);
                 left &= !members;
                 if members.count_ones() >= FEW {
                     self.closest_together::<S, C, K>(rays, members, backward, best, sinks, count);
@@ -289,7 +274,7 @@ impl Ssh {
             let (rays, sinks) = (&rays[start..end], &sinks[start..end]);
             let mut left = (active >> start) & ((1 << rays.len()) - 1);
             while left != 0 {
-                let (members, backward) = group(self, rays, left);
+                let (members, backward) = group(|ray| self.is_ordinary(ray), rays, left);
                 left &= !members;
                 if members.count_ones() >= FEW {
                     blocked |= self.occluded_together::<S, C, K>(rays, members, backward, sinks, count) << start;

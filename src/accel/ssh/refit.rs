@@ -46,7 +46,7 @@ pub(super) struct Measured {
 }
 
 impl Measured {
-    fn plus(self, other: Self) -> Self {
+    pub(super) fn plus(self, other: Self) -> Self {
         Self { cost: self.cost + other.cost, useless: self.useless + other.useless }
     }
 }

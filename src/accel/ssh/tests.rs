@@ -10,6 +10,7 @@ use proptest::prelude::*;
 use super::{
     Ssh, SshConfig,
     choose::choose,
+    narrow::Narrow,
     node::{MAX_TRIANGLES, Side, Word},
     packet, traverse,
 };
@@ -42,9 +43,9 @@ fn config(settings: &[(&str, &str)]) -> SshConfig {
     config
 }
 
-fn build(positions: &[Vec3], indices: &[[u32; 3]], settings: &[(&str, &str)]) -> Ssh {
+fn build<A: Accel<Config = SshConfig>>(positions: &[Vec3], indices: &[[u32; 3]], settings: &[(&str, &str)]) -> A {
     let prims = Triangles { positions, indices, topology_epoch: 0 };
-    let ssh = Ssh::build(&prims, &config(settings)).unwrap();
+    let ssh = A::build(&prims, &config(settings)).unwrap();
     ssh.validate(&prims).unwrap();
     ssh
 }
@@ -212,9 +213,20 @@ fn leaves_without_planes_cull_nothing() {
     let (positions, indices) = mesh(300, 4);
     let with = build(&positions, &indices, &[("leaf", "1")]);
     let without = build(&positions, &indices, &[("leaf", "1"), ("leaf_planes", "off")]);
-    let infinite = |ssh: &Ssh| ssh.pairs.iter().flat_map(|p| p.0).filter(|n| n.plane == f32::INFINITY).count();
+    let infinite = |ssh: &Narrow| ssh.pairs.iter().flat_map(|p| p.0).filter(|n| n.plane == f32::INFINITY).count();
     assert_eq!((infinite(&with), infinite(&without)), (0, 300));
     assert!(without.stats().sah_cost > with.stats().sah_cost);
+}
+
+#[test]
+fn more_planes_leave_less_of_the_boxes() {
+    let (positions, indices) = mesh(5000, 6);
+    let [three, four] = ["3", "4"].map(|planes| -> Ssh { build(&positions, &indices, &[("planes", planes)]) });
+    assert!(four.stats().sah_cost < three.stats().sah_cost, "{:?} {:?}", three.stats(), four.stats());
+    assert_eq!(2 * four.stats().node_bytes, 3 * three.stats().node_bytes);
+    let blocks = three.stats().leaves;
+    // Seven children a node on average would be full; SAH trees fill more than four.
+    assert!(three.stats().nodes - blocks < blocks / 4, "{:?}", three.stats());
 }
 
 #[test]
@@ -222,10 +234,10 @@ fn useless_planes_are_counted() {
     // Equal triangles: below the first level no plane takes anything off.
     let positions: Vec<_> = (0..16).flat_map(|_| [Vec3::ZERO, Vec3::X, Vec3::ONE]).collect();
     let indices: Vec<_> = (0..16).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
-    let ssh = build(&positions, &indices, &[("leaf", "1")]);
+    let ssh: Ssh = build(&positions, &indices, &[("leaf", "1")]);
     assert_eq!(ssh.useless_planes(), 30);
     let (positions, indices) = mesh(1000, 5);
-    let ssh = build(&positions, &indices, &[("leaf", "1")]);
+    let ssh: Ssh = build(&positions, &indices, &[("leaf", "1")]);
     assert!(ssh.useless_planes() < 200, "{}", ssh.useless_planes());
 }
 
@@ -236,18 +248,19 @@ fn regions_nest_and_hold_their_triangles_for_any_settings() {
         failure_persistence: None,
         ..ProptestConfig::default()
     });
-    let cases = (0_usize..200, any::<u32>(), 1_usize..9, any::<bool>(), any::<bool>(), any::<bool>());
+    let cases = (0_usize..200, any::<u32>(), 1_usize..9, any::<bool>(), any::<bool>(), any::<bool>(), 0_usize..3);
     runner
-        .run(&cases, |(count, seed, leaf, median, leaf_planes, rechoose)| {
+        .run(&cases, |(count, seed, leaf, median, leaf_planes, rechoose, form)| {
             let (positions, indices) = mesh(count, seed);
             let settings = [
                 ("leaf", leaf.to_string()),
                 ("build", if median { "median" } else { "sah" }.to_owned()),
                 ("leaf_planes", if leaf_planes { "on" } else { "off" }.to_owned()),
                 ("refit", if rechoose { "rechoose" } else { "keep" }.to_owned()),
+                ("planes", ["1", "3", "4"][form].to_owned()),
             ];
             let settings = settings.each_ref().map(|(key, value)| (*key, value.as_str()));
-            let ssh = build(&positions, &indices, &settings);
+            let ssh: Ssh = build(&positions, &indices, &settings);
             let (moved, _) = mesh(count, seed ^ 1);
             let prims = Triangles { positions: &moved, indices: &indices, topology_epoch: 0 };
             let mut out = ssh.clone();

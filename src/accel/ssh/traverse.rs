@@ -1,7 +1,7 @@
 use arrayvec::ArrayVec;
 
 use super::{
-    Ssh,
+    narrow::Narrow,
     node::{Node, Side, Word},
 };
 use crate::{
@@ -240,7 +240,7 @@ pub(super) fn predicted(word: Word) -> Word {
     word.map_bits(branch_barrier)
 }
 
-impl Ssh {
+impl Narrow {
     /// True when f32 node tests are proven for this ray and these planes.
     #[inline(always)]
     pub(super) fn is_ordinary(&self, ray: &TravRay) -> bool {

@@ -1,5 +1,5 @@
 use super::{
-    Ssh,
+    narrow::Narrow,
     node::{Node, Side, Word},
 };
 use crate::{
@@ -11,7 +11,7 @@ use crate::{
 ///
 /// Of the invariants of a single slab hierarchy, every triangle below a node is held against the node's half-space, by the tightness of its plane;
 /// that regions nest and hold what is below them follows from it.
-pub(super) fn validate(ssh: &Ssh, prims: &Triangles<'_>) -> Result<(), String> {
+pub(super) fn validate(ssh: &Narrow, prims: &Triangles<'_>) -> Result<(), String> {
     if ssh.prim_count != prims.len() {
         return Err(format!("{} triangles, built over {}", prims.len(), ssh.prim_count));
     }
@@ -28,7 +28,7 @@ pub(super) fn validate(ssh: &Ssh, prims: &Triangles<'_>) -> Result<(), String> {
 }
 
 struct Walk<'a> {
-    ssh: &'a Ssh,
+    ssh: &'a Narrow,
     prims: &'a Triangles<'a>,
     seen: Vec<bool>,
     next_pair: usize,

@@ -1,6 +1,7 @@
 //! Binary topologies over triangles: which triangles share a leaf and which subtrees are siblings, without any boxes.
 //!
-//! `bvh2` and `ssh` are built over the same topology and differ in what a node stores, so that comparing them compares nodes.
+//! `bvh2` and `ssh` are built over the same topology and differ in what a node stores, so that comparing them compares nodes. Trees of eight children
+//! a node are made of it as well.
 //!
 //! # Source
 //! Binned splits: Wald, "On fast Construction of SAH-based Bounding Volume Hierarchies", 2007. Departures: all three axes
@@ -13,6 +14,7 @@
 mod binned;
 mod bounds;
 mod small;
+pub(super) mod wide;
 
 use rayon::prelude::*;
 

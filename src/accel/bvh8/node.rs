@@ -1,0 +1,128 @@
+#![expect(clippy::cast_possible_truncation, reason = "the builder keeps the numbers of nodes and blocks below 2^28")]
+
+use std::ops::Range;
+
+use glam::Vec3;
+
+use crate::{
+    accel::{
+        sah::BLOCK,
+        topology::MAX_LEAF,
+        wide::{Place, WIDTH, WideNode},
+    },
+    geom::Aabb,
+    simd::branch_barrier,
+};
+
+/// Blocks that one leaf may hold.
+const MAX_LEAF_BLOCKS: usize = MAX_LEAF.div_ceil(BLOCK);
+
+/// Most blocks a tree may hold: a leaf has 28 bits for the first, and the last number marks what is no child.
+pub(super) const MAX_BLOCKS: usize = (1 << 28) - 2;
+
+const LEAF: u32 = 1 << 31;
+const COUNT_SHIFT: u32 = 28;
+const FIRST: u32 = (1 << COUNT_SHIFT) - 1;
+
+/// Where a child is: a node, a run of blocks, or nowhere.
+///
+/// Bit 31 marks a leaf; bits 28..31 are its block count less one, bits 0..28 its first block.
+#[repr(transparent)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(in crate::accel) struct Link(u32);
+
+impl Link {
+    /// A child without triangles; its box is empty, so no ray follows it.
+    pub(super) const NONE: Self = Self(u32::MAX);
+
+    pub(super) fn inner(node: usize) -> Self {
+        Self(node as u32)
+    }
+
+    pub(super) fn leaf(first: usize, count: usize) -> Self {
+        debug_assert!((1..=MAX_LEAF_BLOCKS).contains(&count) && first <= MAX_BLOCKS);
+        Self(LEAF | ((count as u32 - 1) << COUNT_SHIFT) | first as u32)
+    }
+
+    /// Number of blocks of a leaf that has some.
+    #[inline(always)]
+    pub(super) fn span(self) -> usize {
+        ((self.0 & !LEAF) >> COUNT_SHIFT) as usize + 1
+    }
+
+    /// Blocks of a leaf that has some.
+    #[inline(always)]
+    pub(super) fn blocks(self) -> Range<usize> {
+        let first = (self.0 & FIRST) as usize;
+        first..first + self.span()
+    }
+}
+
+impl Place for Link {
+    #[inline(always)]
+    fn is_leaf(self) -> bool {
+        self.0 & LEAF != 0
+    }
+
+    #[inline(always)]
+    fn is_none(self) -> bool {
+        self == Self::NONE
+    }
+
+    #[inline(always)]
+    fn index(self) -> usize {
+        (self.0 & FIRST) as usize
+    }
+
+    #[inline(always)]
+    fn predicted(self) -> Self {
+        Self(branch_barrier(self.0))
+    }
+}
+
+/// Eight children's boxes in structure-of-arrays form.
+#[repr(C, align(32))]
+#[derive(Clone, Copy, Debug)]
+pub(in crate::accel) struct Node {
+    /// `[axis][min, max][child]`.
+    pub(super) planes: [[[f32; WIDTH]; 2]; 3],
+    /// The children, in the order of their triangles; [`Link::NONE`] after the last.
+    pub(super) links: [Link; WIDTH],
+}
+
+const _: () = assert!(size_of::<Node>() == 224);
+
+impl WideNode for Node {
+    type Word = Link;
+
+    #[inline(always)]
+    fn word(&self, slot: usize) -> Link {
+        self.links[slot]
+    }
+}
+
+impl Node {
+    /// Children whose boxes are still to be set.
+    pub(super) fn new(links: [Link; WIDTH]) -> Self {
+        Self { planes: [[[f32::INFINITY; WIDTH], [f32::NEG_INFINITY; WIDTH]]; 3], links }
+    }
+
+    #[inline(always)]
+    pub(super) fn aabb(&self, child: usize) -> Aabb {
+        let [x, y, z] = &self.planes;
+        Aabb {
+            min: Vec3::new(x[0][child], y[0][child], z[0][child]),
+            max: Vec3::new(x[1][child], y[1][child], z[1][child]),
+        }
+    }
+
+    #[inline(always)]
+    pub(super) fn set_aabbs(&mut self, aabbs: &[Aabb; WIDTH]) {
+        for (child, aabb) in aabbs.iter().enumerate() {
+            for axis in 0..3 {
+                self.planes[axis][0][child] = aabb.min[axis];
+                self.planes[axis][1][child] = aabb.max[axis];
+            }
+        }
+    }
+}

@@ -1,0 +1,123 @@
+use glam::Vec3;
+use proptest::prelude::*;
+
+use super::{
+    Bvh8, Bvh8Config,
+    kernel::met,
+    node::{Link, Node},
+    packet::met_together,
+};
+use crate::{
+    accel::{Accel, AccelKind, TravRay, wide::WIDTH},
+    geom::{Aabb, Ray, Triangles},
+    simd::{Simd, SimdLevel, Task, dispatch},
+};
+
+/// The children that a ray meets by every f32 and f64 test of single rays and in a packet of its own kind.
+struct Met<'a> {
+    ray: &'a TravRay,
+    node: &'a Node,
+}
+
+impl Task for Met<'_> {
+    type Output = [u32; 5];
+
+    #[inline(always)]
+    fn run<S: Simd>(self) -> [u32; 5] {
+        let [fused, plain, wide] = met::<S>(self.ray, self.node);
+        let [all, each] = met_together::<S>(self.ray, self.node);
+        [fused, plain, wide, all, each]
+    }
+}
+
+/// A node whose slots hold the box in turn with boxes that nothing meets.
+fn node(aabb: Aabb) -> Node {
+    let mut node = Node::new([Link::NONE; WIDTH]);
+    let mut aabbs = [Aabb::EMPTY; WIDTH];
+    for aabbs in aabbs.chunks_mut(2) {
+        aabbs[0] = aabb;
+    }
+    node.set_aabbs(&aabbs);
+    node
+}
+
+const HALF: u32 = 0b0101_0101;
+
+#[test]
+fn rays_that_pass_a_box_by_miss_it() {
+    let node = node(Aabb { min: Vec3::ZERO, max: Vec3::ONE });
+    for level in SimdLevel::available() {
+        for (origin, dir, due) in [
+            (Vec3::new(0.3, 0.4, 5.0), Vec3::new(0.01, 0.02, -1.0), HALF),
+            (Vec3::new(0.3, 0.4, 5.0), Vec3::new(0.5, 0.01, -1.0), 0),
+            (Vec3::new(0.3, 0.4, 5.0), Vec3::new(0.01, 0.02, 1.0), 0),
+            (Vec3::new(0.5, 0.5, 0.5), Vec3::new(0.3, -0.2, 0.1), HALF),
+        ] {
+            let ray = TravRay::new(&Ray::new(origin, dir)).unwrap();
+            assert_eq!(dispatch(level, Met { ray: &ray, node: &node }), [due; 5], "{origin} {dir} at {level}");
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 2000, failure_persistence: None, ..ProptestConfig::default() })]
+
+    /// The point is exact, and the ray enters along x where it leaves along y: no slack but the test's own.
+    #[test]
+    fn a_box_that_a_ray_touches_in_one_point_is_met(
+        origin in prop::array::uniform3(-100_i8..100),
+        dir in prop::array::uniform3(prop_oneof![-100_i8..0, 1_i8..101]),
+        t in 1_u8..64,
+        sizes in prop::array::uniform3(1_u8..100),
+        scale in -20_i32..20,
+    ) {
+        let scale = f32::from_bits(((127 + scale) << 23).cast_unsigned());
+        let (origin, dir) = (Vec3::from(origin.map(f32::from)) * scale, Vec3::from(dir.map(f32::from)));
+        let touched = origin + dir * scale * f32::from(t);
+        let size = Vec3::from(sizes.map(f32::from)) * dir.signum() * Vec3::new(1.0, -1.0, 1.0);
+        let aabb = Aabb::from_points([touched, touched + size * scale]);
+        let ray = TravRay::new(&Ray { t_far: f32::from(t) * scale, ..Ray::new(origin, dir) }).unwrap();
+        for level in SimdLevel::available() {
+            prop_assert_eq!(dispatch(level, Met { ray: &ray, node: &node(aabb) }), [HALF; 5], "{}", level);
+        }
+    }
+
+    /// Directions of all sizes, some along an axis: the point is rounded, so the box is grown by a place.
+    #[test]
+    fn a_box_around_a_point_of_a_ray_is_met(
+        origin in prop::array::uniform3(-1e3_f32..1e3),
+        dir in prop::array::uniform3(prop_oneof![Just(0.0_f32), -1e3_f32..1e3, -1e-6_f32..1e-6, -1e-16_f32..1e-16]),
+        t in 0_u8..64,
+        grow in prop::array::uniform3(0.0_f32..1.0),
+    ) {
+        let t = f32::from(t) * 0.25;
+        prop_assume!(dir.iter().any(|d| d.abs() > 0.0) && dir.iter().all(|&d| d == 0.0 || d.abs() > 1e-17));
+        let ray = TravRay::new(&Ray { t_far: t, ..Ray::new(Vec3::from(origin), Vec3::from(dir)) }).unwrap();
+        // t is a multiple of a quarter, so the point is off by one rounding of the sum.
+        let range = ray.range();
+        let near = (range.origin.as_dvec3() + range.dir.as_dvec3() * f64::from(t)).as_vec3();
+        let aabb = Aabb {
+            min: Vec3::new(near.x.next_down(), near.y.next_down(), near.z.next_down()),
+            max: Vec3::new(near.x.next_up(), near.y.next_up(), near.z.next_up()) + Vec3::from(grow),
+        };
+        let slanted = dir.iter().all(|&d| d != 0.0);
+        for level in SimdLevel::available() {
+            let [fused, rest @ ..] = dispatch(level, Met { ray: &ray, node: &node(aabb) });
+            prop_assert!(!slanted || fused == HALF, "{}", level);
+            prop_assert_eq!(rest, [HALF; 4], "{}", level);
+        }
+    }
+}
+
+#[test]
+fn nodes_are_few_and_mostly_full() {
+    let corner = |i: u16| Vec3::new(f32::from(i % 40), f32::from(i / 40), f32::from(i % 7) * 0.1);
+    let positions: Vec<_> = (0..1600).flat_map(|i| [corner(i), corner(i) + Vec3::X, corner(i) + Vec3::Y]).collect();
+    let indices: Vec<_> = (0..1600).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+    let prims = Triangles { positions: &positions, indices: &indices, topology_epoch: 0 };
+    let stats = Bvh8::build(&prims, &Bvh8Config::default()).unwrap().stats();
+    let inner = stats.nodes - stats.leaves;
+    assert!(inner * 4 < stats.leaves, "{stats:?}");
+    let binary = AccelKind::Bvh2.build(&[("leaf".to_owned(), "4".to_owned())], &prims).unwrap().stats();
+    assert_eq!(stats.leaves, binary.leaves);
+}

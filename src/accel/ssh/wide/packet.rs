@@ -1,0 +1,248 @@
+//! Rays of common direction signs against the wide form.
+
+use super::{
+    Wide,
+    kernel::{ClosestFrom, End, OccludedFrom, Segment, Segments, cut_all, flips},
+    node::{Node, Word},
+};
+use crate::{
+    accel::{
+        Closest, Counter, HitSink, TravRay,
+        block::TriBlock,
+        packet::{PACKET, PacketRays, bits},
+        query::SLACK,
+        ssh::packet::{self as slabs, PacketSlabs},
+        wide::{
+            WIDTH, WideNode,
+            packet::{self, Entry, FEW, Together, range, spreads},
+            walk,
+        },
+    },
+    simd::{Lanes, Simd},
+};
+
+/// All rays by their bounds, and each of them by its own planes.
+struct Packet<S: Simd> {
+    slabs: PacketSlabs<S>,
+    entry: End<S>,
+    exit: End<S>,
+    flips: u32,
+}
+
+impl<S: Simd> Packet<S> {
+    #[inline(always)]
+    fn new(packet: &PacketRays, active: u32, backward: [bool; 3]) -> Self {
+        let mut ends = [[[0.0; 3]; 2]; 2];
+        for (axis, spread) in spreads::<S>(packet, active).into_iter().enumerate() {
+            for (end, (origin, inv)) in ends.iter_mut().zip(spread.ends(backward[axis])) {
+                (end[0][axis], end[1][axis]) = (origin, inv);
+            }
+        }
+        let [[entry_origin, entry_inv], [exit_origin, exit_inv]] = ends;
+        Self {
+            slabs: PacketSlabs::new(packet, backward),
+            entry: End::new(entry_origin, entry_inv, backward, false),
+            exit: End::new(exit_origin, exit_inv, backward, true),
+            flips: flips(backward),
+        }
+    }
+}
+
+/// The part of one ray.
+#[inline(always)]
+fn of_ray<S: Simd>(segments: &slabs::Segments<S>, ray: usize) -> Segment<f32> {
+    let mut rows = [[0.0; PACKET]; 2];
+    segments.near.store(&mut rows[0]);
+    segments.far.store(&mut rows[1]);
+    Segment { near: rows[0][ray], far: rows[1][ray] }
+}
+
+impl<S: Simd, const K: usize> Together<S, Wide<K>> for Packet<S> {
+    type Mark = Segment<f32>;
+    type Kids = Segments<f32>;
+    type Rays = slabs::Segments<S>;
+
+    #[inline(always)]
+    fn kids() -> Segments<f32> {
+        Segments { near: [0.0; WIDTH], far: [0.0; WIDTH] }
+    }
+
+    #[inline(always)]
+    fn all(&self, node: &Node<K>, mark: Segment<f32>, kids: &mut Segments<f32>) -> u32 {
+        cut_all(node, &self.entry, &self.exit, self.flips, mark, kids)
+    }
+
+    #[inline(always)]
+    fn mark(kids: &Segments<f32>, slot: usize) -> Segment<f32> {
+        Segment { near: kids.near[slot], far: kids.far[slot] }
+    }
+
+    #[inline(always)]
+    fn key(kids: &Segments<f32>, slot: usize) -> u64 {
+        walk::key32(kids.near[slot], slot)
+    }
+
+    #[inline(always)]
+    fn each(&self, node: &Node<K>, slot: usize, rays: &slabs::Segments<S>) -> (u32, slabs::Segments<S>) {
+        let (word, mut segments) = (node.word(slot), *rays);
+        for (row, planes) in node.planes.iter().enumerate() {
+            segments = self.slabs.cut(planes[slot], word.side(row), segments);
+        }
+        (segments.open(), segments)
+    }
+
+    #[inline(always)]
+    fn limit(&mut self, packet: &PacketRays) {
+        self.slabs.limit = S::F::load(&packet.t_cull) + S::F::splat(SLACK);
+    }
+
+    #[inline(always)]
+    fn reopened(&self, rays: &mut slabs::Segments<S>) -> u32 {
+        rays.far = self.slabs.limit.min(rays.far);
+        rays.open()
+    }
+
+    #[inline(always)]
+    fn meeting(&self, block: &TriBlock, rays: &slabs::Segments<S>) -> u32 {
+        self.slabs.meeting(block, None, *rays)
+    }
+
+    #[inline(always)]
+    fn closest_below<C: Counter, H: HitSink>(
+        tree: &Wide<K>,
+        (word, rays, i): (Word, &slabs::Segments<S>, usize),
+        ray: &TravRay,
+        best: &mut Closest,
+        sink: &H,
+        count: &mut C,
+    ) {
+        S::call(ClosestFrom { tree, start: Some((word, of_ray(rays, i))), ray, best, sink, count });
+    }
+
+    #[inline(always)]
+    fn occluded_below<C: Counter, H: HitSink>(
+        tree: &Wide<K>,
+        (word, rays, i): (Word, &slabs::Segments<S>, usize),
+        ray: &TravRay,
+        sink: &H,
+        count: &mut C,
+    ) -> bool {
+        S::call(OccludedFrom { tree, start: Some((word, of_ray(rays, i))), ray, sink, count })
+    }
+}
+
+impl<const K: usize> Wide<K> {
+    #[inline(always)]
+    pub(super) fn walk_closest_packet<S: Simd, C: Counter, H: HitSink>(
+        &self,
+        rays: &[TravRay],
+        active: u32,
+        best: &mut [Closest],
+        sinks: &[H],
+        count: &mut C,
+    ) {
+        for (start, end, mut left) in packet::lanes::<S>(rays.len(), active) {
+            let (rays, best, sinks) = (&rays[start..end], &mut best[start..end], &sinks[start..end]);
+            while left != 0 {
+                let (members, backward) = packet::group(|ray| self.is_ordinary(ray), rays, left);
+                left &= !members;
+                if members.count_ones() > FEW {
+                    self.closest_together::<S, C, H>(rays, members, backward, best, sinks, count);
+                } else {
+                    for i in bits(members) {
+                        self.walk_closest::<S, C, H>(&rays[i], &mut best[i], &sinks[i], count);
+                    }
+                }
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn closest_together<S: Simd, C: Counter, H: HitSink>(
+        &self,
+        rays: &[TravRay],
+        active: u32,
+        backward: [bool; 3],
+        best: &mut [Closest],
+        sinks: &[H],
+        count: &mut C,
+    ) {
+        let mut packet = PacketRays::new(rays);
+        for (i, best) in best.iter().enumerate() {
+            packet.set_limit(i, best);
+        }
+        let together = Packet::<S>::new(&packet, active, backward);
+        if let Some(start) = self.start(&together, &packet, active) {
+            packet::closest::<S, _, _, C, H>(self, together, start, rays, &mut packet, (best, sinks), count);
+        }
+    }
+
+    /// The root, for the rays that meet its box.
+    #[inline(always)]
+    fn start<S: Simd>(
+        &self,
+        together: &Packet<S>,
+        packet: &PacketRays,
+        active: u32,
+    ) -> Option<Entry<S, Self, Packet<S>>> {
+        let rays = together.slabs.clipped(&self.bounds);
+        let mask = rays.open() & active;
+        let mark = Segment { near: range(&packet.t_near32, active)[0], far: range(&packet.t_cull, active)[1] };
+        (mask != 0).then_some(Entry { word: Self::root(), mask, mark, rays })
+    }
+
+    /// The active rays that something blocks.
+    #[inline(always)]
+    pub(super) fn walk_occluded_packet<S: Simd, C: Counter, H: HitSink>(
+        &self,
+        rays: &[TravRay],
+        active: u32,
+        sinks: &[H],
+        count: &mut C,
+    ) -> u32 {
+        let mut blocked = 0;
+        for (start, end, mut left) in packet::lanes::<S>(rays.len(), active) {
+            let (rays, sinks) = (&rays[start..end], &sinks[start..end]);
+            while left != 0 {
+                let (members, backward) = packet::group(|ray| self.is_ordinary(ray), rays, left);
+                left &= !members;
+                if members.count_ones() > FEW {
+                    let packet = PacketRays::new(rays);
+                    let together = Packet::<S>::new(&packet, members, backward);
+                    if let Some(root) = self.start(&together, &packet, members) {
+                        let hits =
+                            packet::occluded::<S, _, _, C, H>(self, &together, root, rays, &packet, sinks, count);
+                        blocked |= hits << start;
+                    }
+                } else {
+                    for i in bits(members) {
+                        let hit = self.walk_occluded::<S, C, H>(&rays[i], &sinks[i], count);
+                        blocked |= u32::from(hit) << (start + i);
+                    }
+                }
+            }
+        }
+        blocked
+    }
+}
+
+/// The children of a node that a packet of equal rays meets: as a whole, and the rays one by one.
+#[cfg(test)]
+#[inline(always)]
+pub(super) fn met_together<S: Simd, const K: usize>(ray: &TravRay, node: &Node<K>) -> [u32; 2] {
+    let rays = [*ray; 3];
+    let range = ray.range();
+    let packet =
+        Packet::<S>::new(&PacketRays::new(&rays), 7, [range.dir.x < 0.0, range.dir.y < 0.0, range.dir.z < 0.0]);
+    let start = slabs::Segments { near: S::F::splat(range.t_near), far: S::F::splat(range.t_far) };
+    let mut kids = Segments { near: [0.0; WIDTH], far: [0.0; WIDTH] };
+    let segment = Segment { near: range.t_near, far: range.t_far };
+    let all = Together::<S, Wide<K>>::all(&packet, node, segment, &mut kids);
+    let mut each = 0;
+    for slot in 0..WIDTH {
+        let hits = Together::<S, Wide<K>>::each(&packet, node, slot, &start).0 & 7;
+        assert!(hits == 0 || hits == 7, "{hits:b}");
+        each |= (hits & 1) << slot;
+    }
+    [all, each]
+}
