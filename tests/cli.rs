@@ -85,7 +85,7 @@ fn wrong_options_end_in_2_with_the_option_named() {
         (&["render", "--accel", "octree"], "bvh2"),
         (&["render", "--accel", "bvh2:colour=red"], "colour"),
         (&["render", "--top", "grid"], "--top"),
-        (&["render", "--precision", "fast"], "exact"),
+        (&["render", "--precision", "best"], "exact"),
         (&["render", "--simd", "neon"], "scalar"),
         (&["render", "-q", "-v"], "--verbose"),
         (&["render", "--frames", "5-1"], "ends before"),

@@ -83,6 +83,14 @@ fn hits_of_the_last_frame_are_written_and_summed_up() {
     };
     assert_eq!(blocked(&[]), [0, 0, u32::MAX, u32::MAX]);
     assert_eq!(blocked(&["--packet"]), [0, 0, u32::MAX, u32::MAX]);
+    assert_eq!(blocked(&["--precision", "fast"]), [0, 0, u32::MAX, u32::MAX]);
+    for accel in ["list", "bvh2", "ssh"] {
+        let mut command = kinora();
+        command.arg("cast").arg(path("a.tris")).arg("--rays").arg(path("r.rays"));
+        let output = command.args(["--accel", accel, "--precision", "fast", "--json"]).assert().success();
+        let json: Value = serde_json::from_slice(&output.get_output().stdout).expect("one JSON object");
+        assert_eq!((&json["precision"], &json["hits"]), (&"fast".into(), &2.into()), "{accel}");
+    }
 }
 
 #[test]

@@ -233,6 +233,8 @@ fn resume_redoes_files_of_other_settings_or_another_scene() {
         &["--shading", "normals"],
         &["--animation", "none"],
         &["--size", "9x16"],
+        &["--precision", "fast"],
+        &["--precision", "fast", "--accel", "ssh"],
     ] {
         assert_eq!(redone(more), 2, "{more:?}");
         assert_eq!(redone(more), 0, "{more:?}");

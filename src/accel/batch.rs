@@ -2,7 +2,7 @@
 
 use super::{AnyAccel, AnyHit, Closest, PACKET, TravRay, packet::bits};
 use crate::{
-    geom::{Hit, Ray, Triangles},
+    geom::{Forms, Hit, Ray, Triangles},
     glam::Vec3,
     simd::{FloatModeError, Simd, SimdLevel, Task, check_float_mode, dispatch},
 };
@@ -26,9 +26,29 @@ impl AnyAccel {
         level: SimdLevel,
         out: &mut [Option<Hit>],
     ) -> Result<(), FloatModeError> {
+        self.closest_hits_as(prims, rays, packet, level, Forms::EXACT, out)
+    }
+
+    /// As [`AnyAccel::closest_hits`], tested as `forms` says. Where a form is fast, the answers depend on `packet` and `level` to within their
+    /// errors.
+    ///
+    /// # Errors
+    /// As there.
+    ///
+    /// # Panics
+    /// As there.
+    pub fn closest_hits_as(
+        &self,
+        prims: &Triangles<'_>,
+        rays: &[Ray],
+        packet: usize,
+        level: SimdLevel,
+        forms: Forms,
+        out: &mut [Option<Hit>],
+    ) -> Result<(), FloatModeError> {
         assert!((1..=PACKET).contains(&packet), "packets of {packet} rays");
         check_float_mode()?;
-        dispatch(level, ClosestBatch { accel: self, prims, rays, packet, out: &mut out[..rays.len()] });
+        dispatch(level, ClosestBatch { accel: self, prims, rays, packet, forms, out: &mut out[..rays.len()] });
         Ok(())
     }
 
@@ -47,9 +67,28 @@ impl AnyAccel {
         level: SimdLevel,
         out: &mut [bool],
     ) -> Result<(), FloatModeError> {
+        self.blocked_as(prims, rays, packet, level, Forms::EXACT, out)
+    }
+
+    /// As [`AnyAccel::blocked`], tested as `forms` says; see [`AnyAccel::closest_hits_as`].
+    ///
+    /// # Errors
+    /// As there.
+    ///
+    /// # Panics
+    /// As there.
+    pub fn blocked_as(
+        &self,
+        prims: &Triangles<'_>,
+        rays: &[Ray],
+        packet: usize,
+        level: SimdLevel,
+        forms: Forms,
+        out: &mut [bool],
+    ) -> Result<(), FloatModeError> {
         assert!((1..=PACKET).contains(&packet), "packets of {packet} rays");
         check_float_mode()?;
-        dispatch(level, BlockedBatch { accel: self, prims, rays, packet, out: &mut out[..rays.len()] });
+        dispatch(level, BlockedBatch { accel: self, prims, rays, packet, forms, out: &mut out[..rays.len()] });
         Ok(())
     }
 }
@@ -59,6 +98,7 @@ struct ClosestBatch<'a> {
     prims: &'a Triangles<'a>,
     rays: &'a [Ray],
     packet: usize,
+    forms: Forms,
     out: &'a mut [Option<Hit>],
 }
 
@@ -67,11 +107,11 @@ impl Task for ClosestBatch<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self) {
-        let Self { accel, prims, rays, packet, out } = self;
+        let Self { accel, prims, rays, packet, forms, out } = self;
         if packet == 1 {
             for (ray, out) in rays.iter().zip(out) {
                 *out = None;
-                if let Some(ray) = TravRay::new(ray) {
+                if let Some(ray) = TravRay::with_forms(ray, forms) {
                     let mut best = Closest::new(&ray);
                     accel.closest::<S, _, _>(prims, &ray, &mut best, &AnyHit, &mut ());
                     *out = best.hit(&ray);
@@ -80,7 +120,7 @@ impl Task for ClosestBatch<'_> {
             return;
         }
         for (rays, out) in rays.chunks(packet).zip(out.chunks_mut(packet)) {
-            let Some((rays, active)) = Together::of(rays) else { return };
+            let Some((rays, active)) = Together::of(rays, forms) else { return };
             let mut best = [Closest::new(&rays.0[0]); PACKET];
             for (best, ray) in best.iter_mut().zip(&rays.0) {
                 *best = Closest::new(ray);
@@ -101,6 +141,7 @@ struct BlockedBatch<'a> {
     prims: &'a Triangles<'a>,
     rays: &'a [Ray],
     packet: usize,
+    forms: Forms,
     out: &'a mut [bool],
 }
 
@@ -109,18 +150,18 @@ impl Task for BlockedBatch<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self) {
-        let Self { accel, prims, rays, packet, out } = self;
+        let Self { accel, prims, rays, packet, forms, out } = self;
         if packet == 1 {
             for (ray, out) in rays.iter().zip(out) {
                 *out = false;
-                if let Some(ray) = TravRay::new(ray) {
+                if let Some(ray) = TravRay::with_forms(ray, forms) {
                     *out = accel.occluded::<S, _, _>(prims, &ray, &AnyHit, &mut ());
                 }
             }
             return;
         }
         for (rays, out) in rays.chunks(packet).zip(out.chunks_mut(packet)) {
-            let Some((rays, active)) = Together::of(rays) else { return };
+            let Some((rays, active)) = Together::of(rays, forms) else { return };
             let count = out.len();
             let sinks = [AnyHit; PACKET];
             let blocked = accel.occluded_packet::<S, _, _>(prims, &rays.0[..count], active, &sinks[..count], &mut ());
@@ -138,11 +179,11 @@ struct Together([TravRay; PACKET]);
 impl Together {
     /// The rays, and the bits of those that can hit something.
     #[inline(always)]
-    fn of(rays: &[Ray]) -> Option<(Self, u32)> {
-        let mut out = Self([TravRay::new(&Ray::new(Vec3::ZERO, Vec3::X))?; PACKET]);
+    fn of(rays: &[Ray], forms: Forms) -> Option<(Self, u32)> {
+        let mut out = Self([TravRay::with_forms(&Ray::new(Vec3::ZERO, Vec3::X), forms)?; PACKET]);
         let mut active = 0;
         for (i, ray) in rays.iter().enumerate() {
-            if let Some(ray) = TravRay::new(ray) {
+            if let Some(ray) = TravRay::with_forms(ray, forms) {
                 out.0[i] = ray;
                 active |= 1 << i;
             }

@@ -1,15 +1,16 @@
 //! Leaves: blocks of four triangles in structure-of-arrays form, tested against a ray at once.
 //!
-//! The test evaluates the volumes of [`crate::geom::exact`] in f64, four triangles to a vector, with their bounds. Lanes that
-//! surely miss are dropped; sure hits are kept with their f64 values; only what is left in doubt goes to integers.
-//! f64 costs no more instructions here than f32 would: four f64 fill an AVX register.
+//! The test evaluates the volumes of [`crate::geom::exact`] in f64, four triangles to a vector. Lanes that surely miss are dropped by
+//! one bound for all blocks of a ray; what is left gets bounds of its own: sure hits are kept with their f64 values, and only
+//! what is in doubt still goes to integers. f64 costs no more instructions here than f32 would: four f64 fill an AVX register.
+//! [`Forms::leaves`](crate::geom::Forms) may ask for f32 without bounds instead: `fast.rs`.
 
 use glam::{Mat4, Vec3, Vec3A, Vec4};
 
 use super::{Closest, Counter, HitSink, TravRay, query::blocks, sah::BLOCK};
 use crate::{
     geom::{
-        Aabb, PrimId, Triangles,
+        Aabb, Precision, PrimId, Triangles,
         exact::{BOUND, Quotients, TriangleHit},
     },
     simd::{Lanes, Simd},
@@ -20,8 +21,9 @@ pub(super) const NO_PRIM: u32 = u32::MAX;
 
 /// Four triangles: `corners[corner][axis][lane]`.
 ///
-/// Lanes without a triangle, and triangles with a corner that is not finite, have all corners at one point: no area, no hit. It
-/// is a corner of another triangle of the block, so that it widens no box; 0 where there is none.
+/// Triangles with a corner that is not finite have all corners at one point: no area, no hit. It is a corner of another triangle of the
+/// block, so that it widens no box; 0 where there is none. Lanes without a triangle repeat another of the block, so that they are
+/// missed as cheaply as it is; who hits one must look at its number.
 #[repr(C, align(32))]
 #[derive(Clone, Copy, Debug)]
 pub(super) struct TriBlock {
@@ -83,9 +85,20 @@ impl TriBlock {
 
     /// The corners in f64.
     #[inline(always)]
-    pub(super) fn widened<S: Simd>(&self) -> [D3<S>; 3] {
+    fn widened<S: Simd>(&self) -> [D3<S>; 3] {
         let [a, b, c] = &self.corners;
         [widened3::<S>(a), widened3::<S>(b), widened3::<S>(c)]
+    }
+
+    /// The corners as they are.
+    #[inline(always)]
+    pub(super) fn narrow<S: Simd>(&self) -> [[S::F4; 3]; 3] {
+        let [a, b, c] = &self.corners;
+        [
+            [S::F4::load(&a[0]), S::F4::load(&a[1]), S::F4::load(&a[2])],
+            [S::F4::load(&b[0]), S::F4::load(&b[1]), S::F4::load(&b[2])],
+            [S::F4::load(&c[0]), S::F4::load(&c[1]), S::F4::load(&c[2])],
+        ]
     }
 
     /// The boxes of the four triangles: lower and upper planes of each axis. Those of lanes that are never hit are points.
@@ -127,10 +140,12 @@ impl TriBlock {
             }
         }
         if left != 0 {
-            let point = rows[0][(!left).trailing_zeros() as usize & 3];
+            let first = (!left).trailing_zeros() as usize & 3;
+            let point = rows[0][first];
             for lane in (0..4).filter(|lane| left >> lane & 1 == 1) {
+                let absent = self.prims[lane] == NO_PRIM;
                 for row in &mut rows {
-                    row[lane] = point;
+                    row[lane] = if absent { row[first] } else { point };
                 }
             }
         }
@@ -139,39 +154,6 @@ impl TriBlock {
             *corner = [axes.x_axis.to_array(), axes.y_axis.to_array(), axes.z_axis.to_array()];
         }
         BlockBounds { aabb: Aabb { min: min.into(), max: max.into() }, own_area }
-    }
-
-    /// Evaluates all four triangles. Lanes of triangles that surely miss, or are surely hit outside of
-    /// `[t_near, t_limit]`, are not in the mask; `t_limit` is at most the ray's end.
-    #[inline(always)]
-    fn evaluate<S: Simd>(&self, ray: &BlockRay, t_limit: f64) -> Evaluated<S> {
-        let [v0, v1, v2] = self.widened::<S>();
-        let (origin, dir) = (splat3::<S>(&ray.origin), splat3::<S>(&ray.dir));
-        let (e1, e2, s) = (sub::<S>(v1, v0), sub::<S>(v2, v0), sub::<S>(origin, v0));
-        let (p, q) = (cross::<S>(dir, e2), cross::<S>(s, e1));
-        let (det, u, v) = (dot::<S>(e1, p), dot::<S>(s, p), dot::<S>(dir, q));
-        let w = det - u - v;
-        let (n1, n2, ns) = (norm1::<S>(e1), norm1::<S>(e2), norm1::<S>(s));
-        let n12 = n1 * n2;
-        let reach = S::D4::splat(ray.reach);
-        let det_error = reach * n12;
-        let uv_error = reach * ns.mul_add_loose(n1 + n2, n12);
-        let (low, high) = (u.min(v).min(w), u.max(v).max(w));
-        let outside = low.lt(-uv_error) & uv_error.lt(high);
-        let t_error = n12 * ns * S::D4::splat(BOUND);
-        // As `Quotients::bounded`.
-        let inv_det = S::D4::splat(1.0) / det;
-        let t = dot::<S>(e2, q) * inv_det;
-        let slack = t.abs().mul_add_loose(det_error, t_error) * inv_det.abs() * S::D4::splat(2.0);
-        let slack = t.abs().mul_add_loose(S::D4::splat(4.0 * f64::EPSILON), slack);
-        let (t_low, t_high) = (t - slack, t + slack);
-        let solid = (det_error * S::D4::splat(4.0)).le(det.abs());
-        let (t_near, t_far) = (S::D4::splat(ray.t_near), S::D4::splat(ray.t_far));
-        let beyond = solid & (S::D4::splat(t_limit).lt(t_low) | t_high.lt(t_near));
-        let mask = S::D4::splat(0.0).lt(det_error) & !(outside | beyond);
-        let inside = uv_error.lt(low) | high.lt(-uv_error);
-        let sure = solid & inside & t_near.le(t_low) & t_high.le(t_far);
-        Evaluated { mask, sure, rows: [t_low, t_high, inv_det, u, v, det_error, uv_error] }
     }
 
     /// Offers every triangle of the block that may beat the best.
@@ -185,7 +167,16 @@ impl TriBlock {
         count: &mut C,
     ) {
         count.block();
-        let evaluated = self.evaluate::<S>(block_ray, best.t_high());
+        if block_ray.fast {
+            self.closest_fast::<S, K>(ray, best, sink);
+            return;
+        }
+        let volumes = Volumes::<S::D4>::new(self.widened::<S>(), splat3(&block_ray.origin), splat3(&block_ray.dir));
+        let open = volumes.open(S::D4::splat(block_ray.uv_error));
+        if open == 0 {
+            return;
+        }
+        let evaluated = Evaluated::new(&volumes, open, &block_ray.weights(best.t_high()));
         if evaluated.mask == 0 {
             return;
         }
@@ -195,8 +186,11 @@ impl TriBlock {
             let lane = (mask.trailing_zeros() & 3) as usize;
             mask &= mask - 1;
             let prim = PrimId(self.prims[lane]);
+            if prim.0 == NO_PRIM {
+                continue;
+            }
             if evaluated.sure >> lane & 1 == 1 {
-                best.keep(spilled.hit(self, lane), ray, prim, sink);
+                best.keep(spilled.hit(lane, self, lane), ray, prim, sink);
             } else {
                 best.offer_exactly(ray, self.corners(lane), prim, sink);
             }
@@ -213,7 +207,15 @@ impl TriBlock {
         count: &mut C,
     ) -> bool {
         count.block();
-        let evaluated = self.evaluate::<S>(block_ray, f64::from(ray.range().t_far));
+        if block_ray.fast {
+            return self.occluded_fast::<S, K>(ray, sink);
+        }
+        let volumes = Volumes::<S::D4>::new(self.widened::<S>(), splat3(&block_ray.origin), splat3(&block_ray.dir));
+        let open = volumes.open(S::D4::splat(block_ray.uv_error));
+        if open == 0 {
+            return false;
+        }
+        let evaluated = Evaluated::new(&volumes, open, &block_ray.weights(block_ray.t_far));
         if evaluated.mask == 0 {
             return false;
         }
@@ -223,8 +225,11 @@ impl TriBlock {
             let lane = (mask.trailing_zeros() & 3) as usize;
             mask &= mask - 1;
             let prim = PrimId(self.prims[lane]);
+            if prim.0 == NO_PRIM {
+                continue;
+            }
             let blocked = if evaluated.sure >> lane & 1 == 1 {
-                K::ACCEPTS_ALL || blocks(&spilled.hit(self, lane), ray, prim, sink)
+                K::ACCEPTS_ALL || blocks(&spilled.hit(lane, self, lane), ray, prim, sink)
             } else {
                 self.blocks_exactly(ray, lane, sink)
             };
@@ -249,59 +254,158 @@ pub(super) struct BlockRay {
     origin: [f64; 3],
     dir: [f64; 3],
     /// `BOUND * |dir|∞`.
-    reach: f64,
+    scale: f64,
+    /// Bound on the errors of U, V and W of every triangle within `reach` of 0.
+    uv_error: f64,
     t_near: f64,
     t_far: f64,
+    /// Triangles are tested as [`Forms::leaves`](crate::geom::Forms) names it.
+    fast: bool,
 }
 
 impl BlockRay {
+    /// For blocks whose coordinates are at most `reach` in size, which is finite.
+    ///
+    /// Edges are then at most 2 `reach` long on each axis and origins `reach + |origin|∞` away, so `n12 + ns (n1 + n2)` is at most
+    /// `36 reach (2 reach + |origin|∞)`: too much by orders of magnitude for most triangles, and still below 2^-30 of the volumes that most
+    /// rays have, which is all that matters for lanes that miss.
     #[inline(always)]
-    pub(super) fn new(ray: &TravRay) -> Self {
+    pub(super) fn new(ray: &TravRay, reach: f32) -> Self {
         let range = ray.range();
+        let scale = BOUND * f64::from(range.dir.abs().max_element());
+        let (reach, far) = (f64::from(reach), f64::from(range.origin.abs().max_element()));
         Self {
             origin: range.origin.as_dvec3().to_array(),
             dir: range.dir.as_dvec3().to_array(),
-            reach: BOUND * f64::from(range.dir.abs().max_element()),
+            scale,
+            uv_error: scale * (40.0 * reach) * (2.0 * reach + far),
             t_near: f64::from(range.t_near),
             t_far: f64::from(range.t_far),
+            fast: ray.forms().leaves == Precision::Fast,
+        }
+    }
+
+    #[inline(always)]
+    fn weights<L: Lanes<Elem = f64>>(&self, t_limit: f64) -> Weights<L> {
+        Weights {
+            scale: L::splat(self.scale),
+            t_near: L::splat(self.t_near),
+            t_far: L::splat(self.t_far),
+            t_limit: L::splat(t_limit),
         }
     }
 }
 
-/// Four triangles after the f64 test.
-struct Evaluated<S: Simd> {
+/// Edges and volumes of four triangles, before any of it is compared with an error.
+pub(super) struct Volumes<L> {
+    pub(super) e1: [L; 3],
+    pub(super) e2: [L; 3],
+    pub(super) s: [L; 3],
+    /// `s x e1`.
+    pub(super) q: [L; 3],
+    pub(super) det: L,
+    pub(super) u: L,
+    pub(super) v: L,
+    /// The least and the greatest of U, V and W.
+    pub(super) low: L,
+    pub(super) high: L,
+}
+
+impl<L: Lanes> Volumes<L> {
+    #[inline(always)]
+    pub(super) fn new([v0, v1, v2]: [[L; 3]; 3], origin: [L; 3], dir: [L; 3]) -> Self {
+        let (e1, e2, s) = (sub(v1, v0), sub(v2, v0), sub(origin, v0));
+        let (p, q) = (cross(dir, e2), cross(s, e1));
+        let (det, u, v) = (dot(e1, p), dot(s, p), dot(dir, q));
+        let w = det - u - v;
+        Self { e1, e2, s, q, det, u, v, low: u.min(v).min(w), high: u.max(v).max(w) }
+    }
+
+    /// Lanes that do not surely miss when the volumes are off by at most `error`.
+    #[inline(always)]
+    pub(super) fn open(&self, error: L) -> u32 {
+        L::ALL & !(self.low.lt(-error) & error.lt(self.high))
+    }
+}
+
+/// What a weighing needs to know of the rays, a lane each or the same in all.
+pub(super) struct Weights<L> {
+    /// `BOUND * |dir|∞`.
+    pub(super) scale: L,
+    pub(super) t_near: L,
+    pub(super) t_far: L,
+    /// At most `t_far`.
+    pub(super) t_limit: L,
+}
+
+/// Triangles and rays after the f64 test, a pair to a lane.
+pub(super) struct Evaluated<L> {
     /// Lanes that may hit.
-    mask: u32,
+    pub(super) mask: u32,
     /// Lanes that surely hit, within the ray's range.
-    sure: u32,
+    pub(super) sure: u32,
     /// Bounds on t, then the fields of [`Quotients`].
-    rows: [S::D4; 7],
+    pub(super) rows: [L; 7],
+}
+
+impl<L: Lanes<Elem = f64>> Evaluated<L> {
+    /// Weighs the volumes of the lanes in `open` against their errors. Lanes of triangles that surely miss, or are surely hit outside of
+    /// `[t_near, t_limit]`, are not in the mask.
+    #[inline(always)]
+    pub(super) fn new(volumes: &Volumes<L>, open: u32, ray: &Weights<L>) -> Self {
+        let &Volumes { e1, e2, s, q, det, u, v, low, high } = volumes;
+        let (n1, n2, ns) = (norm1(e1), norm1(e2), norm1(s));
+        let n12 = n1 * n2;
+        let det_error = ray.scale * n12;
+        let uv_error = ray.scale * ns.mul_add_loose(n1 + n2, n12);
+        let outside = low.lt(-uv_error) & uv_error.lt(high);
+        let t_error = n12 * ns * L::splat(BOUND);
+        // As `Quotients::bounded`.
+        let inv_det = L::splat(1.0) / det;
+        let t = dot(e2, q) * inv_det;
+        let slack = t.abs().mul_add_loose(det_error, t_error) * inv_det.abs() * L::splat(2.0);
+        let slack = t.abs().mul_add_loose(L::splat(4.0 * f64::EPSILON), slack);
+        let (t_low, t_high) = (t - slack, t + slack);
+        let solid = (det_error * L::splat(4.0)).le(det.abs());
+        let beyond = solid & (ray.t_limit.lt(t_low) | t_high.lt(ray.t_near));
+        let mask = open & L::splat(0.0).lt(det_error) & !(outside | beyond);
+        let inside = uv_error.lt(low) | high.lt(-uv_error);
+        let sure = solid & inside & ray.t_near.le(t_low) & t_high.le(ray.t_far);
+        Self { mask, sure, rows: [t_low, t_high, inv_det, u, v, det_error, uv_error] }
+    }
 }
 
 /// The rows in memory, for access by lane.
-struct Spilled([[f64; 4]; 7]);
+pub(super) struct Spilled([[f64; 8]; 7]);
 
 impl Spilled {
     #[inline(always)]
-    fn new<S: Simd>(evaluated: &Evaluated<S>) -> Self {
-        let mut rows = [[0.0; 4]; 7];
-        for (row, lanes) in rows.iter_mut().zip(evaluated.rows) {
-            lanes.store(row);
-        }
-        Self(rows)
+    pub(super) fn new<L: Lanes<Elem = f64>>(evaluated: &Evaluated<L>) -> Self {
+        // Filled in place: rows of this size made elsewhere would be copied.
+        let mut out = Self([[0.0; 8]; 7]);
+        let [a, b, c, d, e, f, g] = evaluated.rows;
+        a.store(&mut out.0[0]);
+        b.store(&mut out.0[1]);
+        c.store(&mut out.0[2]);
+        d.store(&mut out.0[3]);
+        e.store(&mut out.0[4]);
+        f.store(&mut out.0[5]);
+        g.store(&mut out.0[6]);
+        out
     }
 
+    /// What `row` found of a triangle of `block`.
     #[inline(always)]
-    fn hit(&self, block: &TriBlock, lane: usize) -> TriangleHit {
+    pub(super) fn hit(&self, row: usize, block: &TriBlock, triangle: usize) -> TriangleHit {
         let [t_low, t_high, inv_det, u, v, det_error, uv_error] = &self.0;
-        let (t_low, t_high, inv_det) = (t_low[lane], t_high[lane], inv_det[lane]);
-        let (u, v, det_error, uv_error) = (u[lane], v[lane], det_error[lane], uv_error[lane]);
+        let (t_low, t_high, inv_det) = (t_low[row], t_high[row], inv_det[row]);
+        let (u, v, det_error, uv_error) = (u[row], v[row], det_error[row], uv_error[row]);
         let quotients = Quotients { inv_det, u, v, det_error, uv_error };
-        TriangleHit { corners: block.corners(lane), t_low, t_high, quotients }
+        TriangleHit { corners: block.corners(triangle), t_low, t_high, quotients }
     }
 }
 
-pub(super) type D3<S> = [<S as Simd>::D4; 3];
+type D3<S> = [<S as Simd>::D4; 3];
 
 // No closures and no `map` here: they do not inherit the features of the function they stand in, and intrinsics become
 // calls.
@@ -312,17 +416,17 @@ fn widened3<S: Simd>(rows: &[[f32; 4]; 3]) -> D3<S> {
 }
 
 #[inline(always)]
-fn splat3<S: Simd>(v: &[f64; 3]) -> D3<S> {
-    [S::D4::splat(v[0]), S::D4::splat(v[1]), S::D4::splat(v[2])]
+pub(super) fn splat3<L: Lanes>(v: &[L::Elem; 3]) -> [L; 3] {
+    [L::splat(v[0]), L::splat(v[1]), L::splat(v[2])]
 }
 
 #[inline(always)]
-pub(super) fn sub<S: Simd>(a: D3<S>, b: D3<S>) -> D3<S> {
+pub(super) fn sub<L: Lanes>(a: [L; 3], b: [L; 3]) -> [L; 3] {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 
 #[inline(always)]
-pub(super) fn cross<S: Simd>(a: D3<S>, b: D3<S>) -> D3<S> {
+pub(super) fn cross<L: Lanes>(a: [L; 3], b: [L; 3]) -> [L; 3] {
     [
         a[1].mul_sub_loose(b[2], a[2] * b[1]),
         a[2].mul_sub_loose(b[0], a[0] * b[2]),
@@ -331,11 +435,11 @@ pub(super) fn cross<S: Simd>(a: D3<S>, b: D3<S>) -> D3<S> {
 }
 
 #[inline(always)]
-pub(super) fn dot<S: Simd>(a: D3<S>, b: D3<S>) -> S::D4 {
+pub(super) fn dot<L: Lanes>(a: [L; 3], b: [L; 3]) -> L {
     a[0].mul_add_loose(b[0], a[1].mul_add_loose(b[1], a[2] * b[2]))
 }
 
 #[inline(always)]
-pub(super) fn norm1<S: Simd>(a: D3<S>) -> S::D4 {
+pub(super) fn norm1<L: Lanes>(a: [L; 3]) -> L {
     a[0].abs() + a[1].abs() + a[2].abs()
 }

@@ -58,7 +58,7 @@ impl<V: Visitor> Leaves for Objects<'_, V> {
     }
 }
 
-/// Blocks of triangles, for the closest hit.
+/// Blocks of triangles, for the closest hit; `reach` as in [`BlockRay::new`].
 pub(super) struct ClosestBlocks<'a, K> {
     pub(super) blocks: &'a [TriBlock],
     pub(super) ray: &'a TravRay,
@@ -72,8 +72,14 @@ pub(super) struct ClosestLeaves<'a, S, K>(pub(super) ClosestBlocks<'a, K>, pub(s
 
 impl<'a, S, K> ClosestLeaves<'a, S, K> {
     #[inline(always)]
-    pub(super) fn new(blocks: &'a [TriBlock], ray: &'a TravRay, best: &'a mut Closest, sink: &'a K) -> Self {
-        let block_ray = BlockRay::new(ray);
+    pub(super) fn new(
+        blocks: &'a [TriBlock],
+        reach: f32,
+        ray: &'a TravRay,
+        best: &'a mut Closest,
+        sink: &'a K,
+    ) -> Self {
+        let block_ray = BlockRay::new(ray, reach);
         Self(ClosestBlocks { blocks, ray, block_ray, best, sink }, std::marker::PhantomData)
     }
 }
@@ -99,7 +105,7 @@ impl<S: Simd, K: HitSink> Leaves for ClosestLeaves<'_, S, K> {
     }
 }
 
-/// Blocks of triangles, for any hit.
+/// As [`ClosestLeaves`], for any hit.
 pub(super) struct OccludedLeaves<'a, S, K> {
     blocks: &'a [TriBlock],
     ray: &'a TravRay,
@@ -110,8 +116,8 @@ pub(super) struct OccludedLeaves<'a, S, K> {
 
 impl<'a, S, K> OccludedLeaves<'a, S, K> {
     #[inline(always)]
-    pub(super) fn new(blocks: &'a [TriBlock], ray: &'a TravRay, sink: &'a K) -> Self {
-        Self { blocks, ray, block_ray: BlockRay::new(ray), sink, level: std::marker::PhantomData }
+    pub(super) fn new(blocks: &'a [TriBlock], reach: f32, ray: &'a TravRay, sink: &'a K) -> Self {
+        Self { blocks, ray, block_ray: BlockRay::new(ray, reach), sink, level: std::marker::PhantomData }
     }
 }
 

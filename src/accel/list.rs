@@ -6,10 +6,10 @@
 
 use super::{
     Accel, AccelConfig, AccelStats, BuildError, Closest, Counter, HitSink, Refit, TravRay, Violation, check_indices,
-    query::blocks,
+    query::is_blocked_by,
 };
 use crate::{
-    geom::{Aabb, PrimId, Triangles, exact::TriangleHit},
+    geom::{Aabb, PrimId, Triangles},
     simd::Simd,
 };
 
@@ -88,7 +88,7 @@ impl Accel for List {
     ) -> bool {
         ids(prims).any(|prim| {
             count.prim();
-            TriangleHit::test(ray.range(), prims.corners(prim)).is_some_and(|hit| blocks(&hit, ray, prim, sink))
+            is_blocked_by(ray, prims, prim, sink)
         })
     }
 

@@ -9,17 +9,19 @@
 //!
 //! and for rays from one origin `U = d . (e2 x s)`, `V = d . (s x e1)`, where all but d belongs to the triangle. Every term has the
 //! same factors and no more roundings than in the order that [`BOUND`] is derived for, so the bound holds.
+//!
+//! All rays of a packet are tested in f32 first, where the same derivation gives the bound [`BOUND32`] times the same sizes: most triangles
+//! of a leaf are missed by most rays, and f32 proves that for twice as many rays at a time. What is left is tested in f64, or, where
+//! [`Forms::leaves`](crate::geom::Forms) is fast, divided as it is.
 
 use super::{
     Closest, Counter, HitSink, TravRay,
-    block::{BlockRay, D3, NO_PRIM, TriBlock, cross, dot, norm1, sub},
+    block::{BlockRay, Evaluated, NO_PRIM, Spilled, TriBlock, Volumes, Weights, cross, dot, norm1, splat3, sub},
+    fast::{Divided, accepts},
     query::{GROW, ORDINARY_MAX, SHRINK, SLACK, blocks},
 };
 use crate::{
-    geom::{
-        Aabb, PrimId,
-        exact::{BOUND, Quotients, TriangleHit},
-    },
+    geom::{Aabb, Precision, PrimId, exact::BOUND},
     simd::{Lanes, Simd},
 };
 
@@ -34,7 +36,7 @@ const FEW: u32 = 2;
 
 type Row = [f64; PACKET];
 
-/// The rays of a packet by component. Triangle tests widen what they load.
+/// The rays of a packet by component. Triangle tests in f64 widen what they load.
 pub(super) struct PacketRays {
     pub(super) origin32: [[f32; PACKET]; 3],
     pub(super) dir32: [[f32; PACKET]; 3],
@@ -43,16 +45,36 @@ pub(super) struct PacketRays {
     pub(super) t_cull: [f32; PACKET],
     t_far: [f32; PACKET],
     /// `|dir|∞`.
-    reach: [f32; PACKET],
+    scale: [f32; PACKET],
     /// Nothing beyond counts any more.
     t_limit: Row,
     common_origin: bool,
+    /// The greatest `|dir|∞`.
+    longest: f32,
+    /// Bound on `|origin - first origin|₁`.
+    spread: f32,
+    /// Greatest coordinate of the triangles to come, as in [`BlockRay::new`].
+    reach: f32,
+    /// Products of what the rays and the triangles hold neither overflow in f32 nor lose more than [`TINY`] by underflow.
+    moderate: bool,
+    /// Triangles are tested as [`Forms::leaves`](crate::geom::Forms) names it.
+    fast: bool,
 }
 
+/// Magnitudes of coordinates and directions up to which volumes in f32 do not overflow: 2^30.
+const MODERATE: f32 = 1_073_741_824.0;
+
+/// [`BOUND`] for f32, with room for the roundings of the bound itself, which is evaluated in f32.
+const BOUND32: f32 = 20.0 / 16_777_216.0;
+
+/// Above what volumes of moderate numbers lose by underflow: products off by 2^-150, a few of them, times factors below 2^32.
+const TINY: f32 = f32::from_bits((127 - 110) << 23);
+
 impl PacketRays {
-    /// Spreads up to [`PACKET`] rays, at least one; lanes without a ray repeat the last and must not be active.
+    /// Spreads up to [`PACKET`] rays, at least one; lanes without a ray repeat the last and must not be active. The blocks that they are
+    /// tested with stay within `reach` of 0.
     #[inline(always)]
-    pub(super) fn new(rays: &[TravRay]) -> Self {
+    pub(super) fn new(rays: &[TravRay], reach: f32) -> Self {
         let row = [0.0; PACKET];
         // Filled in place: a struct of this size made elsewhere would be copied.
         let mut out = Self {
@@ -61,12 +83,18 @@ impl PacketRays {
             t_near32: row,
             t_cull: row,
             t_far: row,
-            reach: row,
+            scale: row,
             t_limit: [0.0; PACKET],
             common_origin: false,
+            longest: 0.0,
+            spread: 0.0,
+            reach,
+            moderate: false,
+            fast: rays[0].forms().leaves == Precision::Fast,
         };
         let mut differing = 0;
         let first = rays[0].range().origin;
+        let (mut low, mut high) = (first, first);
         for i in 0..PACKET {
             let range = rays[i.min(rays.len() - 1)].range();
             for axis in 0..3 {
@@ -74,13 +102,19 @@ impl PacketRays {
                 out.dir32[axis][i] = range.dir[axis];
                 differing |= range.origin[axis].to_bits() ^ first[axis].to_bits();
             }
-            out.reach[i] = range.dir.abs().max_element();
+            let scale = range.dir.abs().max_element();
+            out.scale[i] = scale;
+            out.longest = if scale > out.longest { scale } else { out.longest };
+            (low, high) = (range.origin.min(low), range.origin.max(high));
             out.t_near32[i] = range.t_near;
             out.t_cull[i] = range.t_far;
             out.t_far[i] = range.t_far;
             out.t_limit[i] = f64::from(range.t_far);
         }
         out.common_origin = differing == 0;
+        out.spread = (high - low).element_sum();
+        let far = low.abs().max(high.abs()).max_element().max(reach).max(out.longest);
+        out.moderate = far <= MODERATE;
         out
     }
 
@@ -155,174 +189,110 @@ impl PacketBoxes {
     }
 }
 
-type Rows3 = [[f64; 4]; 3];
+type Rows3 = [[f32; 4]; 3];
 
-/// What the four triangles of a block have for every ray of a packet.
+/// What the four triangles of a block have for every ray of a packet, in f32.
 struct Spread {
-    v0: Rows3,
-    e1: Rows3,
-    e2: Rows3,
     n: Rows3,
-    /// `|e1|₁ |e2|₁` and `|e1|₁ + |e2|₁`.
-    n12: [f64; 4],
-    sum: [f64; 4],
-    /// For a common origin: `e2 x s`, `s x e1`, T and `|s|₁`.
-    cu: Rows3,
-    cv: Rows3,
-    t: [f64; 4],
-    ns: [f64; 4],
+    /// For a common origin `e2 x s` and `s x e1`, else e2 and e1.
+    to_u: Rows3,
+    to_v: Rows3,
+    /// For a common origin; else `v0`.
+    t: [f32; 4],
+    v0: Rows3,
+    /// What U, V and W may be off by: 0 where nobody asks, infinite where nothing bounds it.
+    errors: [f32; 4],
 }
 
 #[inline(always)]
-fn stored<S: Simd>(lanes: D3<S>) -> Rows3 {
-    let mut rows = [[0.0; 4]; 3];
-    for (row, lane) in rows.iter_mut().zip(lanes) {
-        lane.store(row);
-    }
-    rows
-}
-
-#[inline(always)]
-fn stored1<S: Simd>(lane: S::D4) -> [f64; 4] {
-    let mut row = [0.0; 4];
-    lane.store(&mut row);
-    row
+fn store3<L: Lanes<Elem = f32>>(lanes: [L; 3], rows: &mut Rows3) {
+    lanes[0].store(&mut rows[0]);
+    lanes[1].store(&mut rows[1]);
+    lanes[2].store(&mut rows[2]);
 }
 
 impl Spread {
+    /// Filled in place by [`Spread::fill`]: a struct of this size made elsewhere would be copied.
+    const EMPTY: Self = Self {
+        n: [[0.0; 4]; 3],
+        to_u: [[0.0; 4]; 3],
+        to_v: [[0.0; 4]; 3],
+        t: [0.0; 4],
+        v0: [[0.0; 4]; 3],
+        errors: [0.0; 4],
+    };
+
     #[inline(always)]
-    fn new<S: Simd>(block: &TriBlock, packet: &PacketRays) -> Self {
-        let [v0, v1, v2] = block.widened::<S>();
-        let (e1, e2) = (sub::<S>(v1, v0), sub::<S>(v2, v0));
-        let n = cross::<S>(e2, e1);
-        let (n1, n2) = (norm1::<S>(e1), norm1::<S>(e2));
-        let mut out = Self {
-            v0: stored::<S>(v0),
-            e1: stored::<S>(e1),
-            e2: stored::<S>(e2),
-            n: stored::<S>(n),
-            n12: stored1::<S>(n1 * n2),
-            sum: stored1::<S>(n1 + n2),
-            cu: [[0.0; 4]; 3],
-            cv: [[0.0; 4]; 3],
-            t: [0.0; 4],
-            ns: [0.0; 4],
-        };
+    fn fill<S: Simd>(&mut self, block: &TriBlock, packet: &PacketRays) {
+        let [x, y, z] = &packet.origin32;
+        let [v0, v1, v2] = block.narrow::<S>();
+        let (e1, e2, s) = (sub(v1, v0), sub(v2, v0), sub(splat3(&[x[0], y[0], z[0]]), v0));
+        let n = cross(e2, e1);
+        store3(n, &mut self.n);
         if packet.common_origin {
-            let [x, y, z] = &packet.origin32;
-            let origin = [S::D4::splat(f64::from(x[0])), S::D4::splat(f64::from(y[0])), S::D4::splat(f64::from(z[0]))];
-            let s = sub::<S>(origin, v0);
-            out.cu = stored::<S>(cross::<S>(e2, s));
-            out.cv = stored::<S>(cross::<S>(s, e1));
-            out.t = stored1::<S>(-dot::<S>(s, n));
-            out.ns = stored1::<S>(norm1::<S>(s));
+            store3(cross(e2, s), &mut self.to_u);
+            store3(cross(s, e1), &mut self.to_v);
+            (-dot(s, n)).store(&mut self.t);
+        } else {
+            store3(e2, &mut self.to_u);
+            store3(e1, &mut self.to_v);
+            store3(v0, &mut self.v0);
         }
-        out
+        if packet.fast {
+            return;
+        }
+        if packet.moderate {
+            let (n1, n2, ns) = (norm1(e1), norm1(e2), norm1(s) + S::F4::splat(packet.spread));
+            let size = ns.mul_add_loose(n1 + n2, n1 * n2);
+            let errors = size.mul_add_loose(S::F4::splat(BOUND32 * packet.longest), S::F4::splat(TINY));
+            errors.store(&mut self.errors);
+        } else {
+            self.errors = [f32::INFINITY; 4];
+        }
+    }
+
+    /// D, U, V and T of a triangle for rays from `origin` along `dir`, and the rays that it is not surely missed by.
+    #[inline(always)]
+    fn test<L: Lanes<Elem = f32>>(
+        &self,
+        lane: usize,
+        [origin, dir]: [[L; 3]; 2],
+        common_origin: bool,
+    ) -> ([L; 4], u32) {
+        let n = row3(&self.n, lane);
+        let det = dot(dir, n);
+        let (u, v, t);
+        if common_origin {
+            u = dot(dir, row3(&self.to_u, lane));
+            v = dot(dir, row3(&self.to_v, lane));
+            t = L::splat(self.t[lane]);
+        } else {
+            let s = sub(origin, row3(&self.v0, lane));
+            let m = cross(s, dir);
+            u = dot(row3(&self.to_u, lane), m);
+            v = -dot(row3(&self.to_v, lane), m);
+            t = -dot(s, n);
+        }
+        let w = det - u - v;
+        let error = L::splat(self.errors[lane]);
+        let outside = u.min(v).min(w).lt(-error) & error.lt(u.max(v).max(w));
+        ([det, u, v, t], L::ALL & !outside)
     }
 }
 
-/// One triangle against as many rays as `S::D` has lanes.
-struct Evaluated<S: Simd> {
-    /// Rays that may hit.
-    mask: u32,
-    /// Rays that surely hit, within their range.
-    sure: u32,
-    rows: [S::D; 7],
-}
-
-type W3<S> = [<S as Simd>::D; 3];
-
 #[inline(always)]
-fn splat3<S: Simd>(rows: &Rows3, lane: usize) -> W3<S> {
-    [S::D::splat(rows[0][lane]), S::D::splat(rows[1][lane]), S::D::splat(rows[2][lane])]
+fn row3<L: Lanes<Elem = f32>>(rows: &Rows3, lane: usize) -> [L; 3] {
+    [L::splat(rows[0][lane]), L::splat(rows[1][lane]), L::splat(rows[2][lane])]
 }
 
 #[inline(always)]
-fn load3<S: Simd>(rows: &[[f32; PACKET]; 3], first: usize) -> W3<S> {
+fn narrow3<S: Simd>(rows: &[[f32; PACKET]; 3]) -> [S::F; 3] {
+    [S::F::load(&rows[0]), S::F::load(&rows[1]), S::F::load(&rows[2])]
+}
+
+#[inline(always)]
+fn wide3<S: Simd>(rows: &[[f32; PACKET]; 3], first: usize) -> [S::D; 3] {
     [S::load_wide(&rows[0][first..]), S::load_wide(&rows[1][first..]), S::load_wide(&rows[2][first..])]
-}
-
-#[inline(always)]
-fn wide_dot<S: Simd>(a: W3<S>, b: W3<S>) -> S::D {
-    a[0].mul_add_loose(b[0], a[1].mul_add_loose(b[1], a[2] * b[2]))
-}
-
-#[inline(always)]
-fn wide_cross<S: Simd>(a: W3<S>, b: W3<S>) -> W3<S> {
-    [
-        a[1].mul_sub_loose(b[2], a[2] * b[1]),
-        a[2].mul_sub_loose(b[0], a[0] * b[2]),
-        a[0].mul_sub_loose(b[1], a[1] * b[0]),
-    ]
-}
-
-/// Triangle `lane` against the rays from number `first` on.
-#[inline(always)]
-fn evaluate<S: Simd>(tri: &Spread, lane: usize, packet: &PacketRays, first: usize) -> Evaluated<S> {
-    let dir = load3::<S>(&packet.dir32, first);
-    let det = wide_dot::<S>(dir, splat3::<S>(&tri.n, lane));
-    let (u, v, t, ns);
-    if packet.common_origin {
-        u = wide_dot::<S>(dir, splat3::<S>(&tri.cu, lane));
-        v = wide_dot::<S>(dir, splat3::<S>(&tri.cv, lane));
-        t = S::D::splat(tri.t[lane]);
-        ns = S::D::splat(tri.ns[lane]);
-    } else {
-        let (origin, v0) = (load3::<S>(&packet.origin32, first), splat3::<S>(&tri.v0, lane));
-        let s = [origin[0] - v0[0], origin[1] - v0[1], origin[2] - v0[2]];
-        let m = wide_cross::<S>(s, dir);
-        u = wide_dot::<S>(splat3::<S>(&tri.e2, lane), m);
-        v = -wide_dot::<S>(splat3::<S>(&tri.e1, lane), m);
-        t = -wide_dot::<S>(s, splat3::<S>(&tri.n, lane));
-        ns = s[0].abs() + s[1].abs() + s[2].abs();
-    }
-    let w = det - u - v;
-    let n12 = S::D::splat(tri.n12[lane]);
-    let reach = S::load_wide(&packet.reach[first..]) * S::D::splat(BOUND);
-    let det_error = reach * n12;
-    let uv_error = reach * ns.mul_add_loose(S::D::splat(tri.sum[lane]), n12);
-    let (low, high) = (u.min(v).min(w), u.max(v).max(w));
-    let mask = S::D::splat(0.0).lt(det_error) & !(low.lt(-uv_error) & uv_error.lt(high));
-    if mask == 0 {
-        return Evaluated { mask, sure: 0, rows: [det; 7] };
-    }
-    // As `Quotients::bounded`.
-    let t_error = n12 * ns * S::D::splat(BOUND);
-    let inv_det = S::D::splat(1.0) / det;
-    let t = t * inv_det;
-    let slack = t.abs().mul_add_loose(det_error, t_error) * inv_det.abs() * S::D::splat(2.0);
-    let slack = t.abs().mul_add_loose(S::D::splat(4.0 * f64::EPSILON), slack);
-    let (t_low, t_high) = (t - slack, t + slack);
-    let (t_near, t_far) = (S::load_wide(&packet.t_near32[first..]), S::load_wide(&packet.t_far[first..]));
-    let t_limit = S::D::load(&packet.t_limit[first..]);
-    let solid = (det_error * S::D::splat(4.0)).le(det.abs());
-    let beyond = solid & (t_limit.lt(t_low) | t_high.lt(t_near));
-    let inside = uv_error.lt(low) | high.lt(-uv_error);
-    let sure = solid & inside & t_near.le(t_low) & t_high.le(t_far);
-    Evaluated { mask: mask & !beyond, sure, rows: [t_low, t_high, inv_det, u, v, det_error, uv_error] }
-}
-
-/// The rows of an [`Evaluated`] in memory, for access by ray.
-struct Spilled([[f64; 8]; 7]);
-
-impl Spilled {
-    #[inline(always)]
-    fn new<S: Simd>(evaluated: &Evaluated<S>) -> Self {
-        let mut rows = [[0.0; 8]; 7];
-        for (row, lanes) in rows.iter_mut().zip(evaluated.rows) {
-            lanes.store(row);
-        }
-        Self(rows)
-    }
-
-    #[inline(always)]
-    fn hit(&self, block: &TriBlock, lane: usize, ray: usize) -> TriangleHit {
-        let [t_low, t_high, inv_det, u, v, det_error, uv_error] = &self.0;
-        let (t_low, t_high, inv_det) = (t_low[ray], t_high[ray], inv_det[ray]);
-        let (u, v, det_error, uv_error) = (u[ray], v[ray], det_error[ray], uv_error[ray]);
-        let quotients = Quotients { inv_det, u, v, det_error, uv_error };
-        TriangleHit { corners: block.corners(lane), t_low, t_high, quotients }
-    }
 }
 
 /// Numbers of the set bits.
@@ -333,6 +303,42 @@ pub(super) fn bits(mut mask: u32) -> impl Iterator<Item = usize> {
         mask &= mask.wrapping_sub(1);
         bit
     })
+}
+
+/// Triangle `lane` of a block against the rays in `open`, counted from number `first` on, in f64.
+#[inline(always)]
+fn widely<S: Simd>(block: &TriBlock, lane: usize, packet: &PacketRays, first: usize, open: u32) -> Evaluated<S::D> {
+    let [a, b, c] = block.corners(lane);
+    let (a, b, c) = (a.as_dvec3().to_array(), b.as_dvec3().to_array(), c.as_dvec3().to_array());
+    let (origin, dir) = (wide3::<S>(&packet.origin32, first), wide3::<S>(&packet.dir32, first));
+    let volumes = Volumes::new([splat3(&a), splat3(&b), splat3(&c)], origin, dir);
+    let weights = Weights {
+        scale: S::load_wide(&packet.scale[first..]) * S::D::splat(BOUND),
+        t_near: S::load_wide(&packet.t_near32[first..]),
+        t_far: S::load_wide(&packet.t_far[first..]),
+        t_limit: S::D::load(&packet.t_limit[first..]),
+    };
+    Evaluated::new(&volumes, open, &weights)
+}
+
+/// t, u and v of a packet's rays in memory.
+struct Stored([[f32; PACKET]; 3]);
+
+impl Stored {
+    #[inline(always)]
+    fn new<L: Lanes<Elem = f32>>(divided: &Divided<L>) -> Self {
+        let mut rows = [[0.0; PACKET]; 3];
+        divided.t.store(&mut rows[0]);
+        divided.u.store(&mut rows[1]);
+        divided.v.store(&mut rows[2]);
+        Self(rows)
+    }
+
+    #[inline(always)]
+    fn tuv(&self, ray: usize) -> [f32; 3] {
+        let [t, u, v] = &self.0;
+        [t[ray], u[ray], v[ray]]
+    }
 }
 
 impl TriBlock {
@@ -349,32 +355,52 @@ impl TriBlock {
     ) {
         if active.count_ones() <= FEW {
             for i in bits(active) {
-                self.closest::<S, C, K>(&rays[i], &BlockRay::new(&rays[i]), &mut best[i], &sinks[i], count);
+                let block_ray = BlockRay::new(&rays[i], packet.reach);
+                self.closest::<S, C, K>(&rays[i], &block_ray, &mut best[i], &sinks[i], count);
                 packet.set_limit(i, &best[i]);
             }
             return;
         }
         count.block();
-        let tri = Spread::new::<S>(self, packet);
+        let mut tri = Spread::EMPTY;
+        tri.fill::<S>(self, packet);
+        let lines = [narrow3::<S>(&packet.origin32), narrow3::<S>(&packet.dir32)];
         for lane in 0..4 {
             let prim = PrimId(self.prim(lane));
             if prim.0 == NO_PRIM {
                 break;
             }
+            let (volumes, open) = tri.test(lane, lines, packet.common_origin);
+            let open = open & active;
+            if open == 0 {
+                continue;
+            }
+            if packet.fast {
+                let (near, limit) = (S::F::load(&packet.t_near32), S::F::load(&packet.t_cull));
+                let divided = Divided::new(volumes, open, near, limit);
+                if divided.mask != 0 {
+                    let stored = Stored::new(&divided);
+                    for i in bits(divided.mask) {
+                        best[i].keep_fast(stored.tuv(i), prim, &sinks[i]);
+                        packet.set_limit(i, &best[i]);
+                    }
+                }
+                continue;
+            }
             for first in (0..S::F::LEN).step_by(S::D::LEN) {
-                let open = (active >> first) & S::D::ALL;
+                let open = (open >> first) & S::D::ALL;
                 if open == 0 {
                     continue;
                 }
-                let evaluated = evaluate::<S>(&tri, lane, packet, first);
-                if evaluated.mask & open == 0 {
+                let evaluated = widely::<S>(self, lane, packet, first, open);
+                if evaluated.mask == 0 {
                     continue;
                 }
                 let spilled = Spilled::new(&evaluated);
-                for bit in bits(evaluated.mask & open) {
+                for bit in bits(evaluated.mask) {
                     let i = first + bit;
                     if (evaluated.sure >> bit) & 1 == 1 {
-                        best[i].keep(spilled.hit(self, lane, bit), &rays[i], prim, &sinks[i]);
+                        best[i].keep(spilled.hit(bit, self, lane), &rays[i], prim, &sinks[i]);
                     } else {
                         best[i].offer_exactly(&rays[i], self.corners(lane), prim, &sinks[i]);
                     }
@@ -397,32 +423,48 @@ impl TriBlock {
         let mut blocked = 0;
         if active.count_ones() <= FEW {
             for i in bits(active) {
-                let hit = self.occluded::<S, C, K>(&rays[i], &BlockRay::new(&rays[i]), &sinks[i], count);
-                blocked |= u32::from(hit) << i;
+                let block_ray = BlockRay::new(&rays[i], packet.reach);
+                blocked |= u32::from(self.occluded::<S, C, K>(&rays[i], &block_ray, &sinks[i], count)) << i;
             }
             return blocked;
         }
         count.block();
-        let tri = Spread::new::<S>(self, packet);
+        let mut tri = Spread::EMPTY;
+        tri.fill::<S>(self, packet);
+        let lines = [narrow3::<S>(&packet.origin32), narrow3::<S>(&packet.dir32)];
         for lane in 0..4 {
             let prim = PrimId(self.prim(lane));
             if prim.0 == NO_PRIM {
                 break;
             }
+            let (volumes, open) = tri.test(lane, lines, packet.common_origin);
+            let open = open & active & !blocked;
+            if open == 0 {
+                continue;
+            }
+            if packet.fast {
+                let (near, far) = (S::F::load(&packet.t_near32), S::F::load(&packet.t_far));
+                let divided = Divided::new(volumes, open, near, far);
+                if K::ACCEPTS_ALL {
+                    blocked |= divided.mask;
+                } else if divided.mask != 0 {
+                    let stored = Stored::new(&divided);
+                    for i in bits(divided.mask) {
+                        blocked |= u32::from(accepts(stored.tuv(i), prim, &sinks[i])) << i;
+                    }
+                }
+                continue;
+            }
             for first in (0..S::F::LEN).step_by(S::D::LEN) {
-                let open = ((active & !blocked) >> first) & S::D::ALL;
+                let open = (open >> first) & S::D::ALL;
                 if open == 0 {
                     continue;
                 }
-                let evaluated = evaluate::<S>(&tri, lane, packet, first);
-                let hits = evaluated.mask & open;
+                let evaluated = widely::<S>(self, lane, packet, first, open);
+                let mut hits = evaluated.mask;
                 if K::ACCEPTS_ALL {
                     blocked |= (hits & evaluated.sure) << first;
-                    for bit in bits(hits & !evaluated.sure) {
-                        blocked |= u32::from(self.blocks_exactly(&rays[first + bit], lane, &sinks[first + bit]))
-                            << (first + bit);
-                    }
-                    continue;
+                    hits &= !evaluated.sure;
                 }
                 if hits == 0 {
                     continue;
@@ -431,7 +473,7 @@ impl TriBlock {
                 for bit in bits(hits) {
                     let i = first + bit;
                     let hit = if (evaluated.sure >> bit) & 1 == 1 {
-                        blocks(&spilled.hit(self, lane, bit), &rays[i], prim, &sinks[i])
+                        blocks(&spilled.hit(bit, self, lane), &rays[i], prim, &sinks[i])
                     } else {
                         self.blocks_exactly(&rays[i], lane, &sinks[i])
                     };

@@ -4,9 +4,10 @@ use std::cmp::Ordering;
 
 use glam::{Vec3, Vec3A};
 
+use super::fast;
 use crate::geom::{
-    Forms, Hit, InstanceId, PrimId, Ray, Triangles,
-    exact::{RayRange, TriangleHit},
+    Forms, Hit, InstanceId, Precision, PrimId, Ray, Triangles,
+    exact::{Quotients, RayRange, TriangleHit},
 };
 
 /// Maps a structure's own triangle numbers to the caller's and decides whether a hit counts.
@@ -181,10 +182,14 @@ impl Closest {
         Some(rounded(hit, ray, *instance, *prim))
     }
 
-    /// Tests one triangle exactly and keeps it when it beats the best.
+    /// Tests one triangle, as the ray's forms say, and keeps it when it beats the best.
     #[inline(always)]
     pub fn offer<K: HitSink>(&mut self, ray: &TravRay, prims: &Triangles<'_>, prim: PrimId, sink: &K) {
-        if let Some(hit) = TriangleHit::test(&ray.range, prims.corners(prim)) {
+        if ray.forms.leaves == Precision::Fast {
+            if let Some(tuv) = fast::test_one(&ray.range, prims.corners(prim), self.cull) {
+                self.keep_fast(tuv, prim, sink);
+            }
+        } else if let Some(hit) = TriangleHit::test(&ray.range, prims.corners(prim)) {
             self.keep(hit, ray, prim, sink);
         }
     }
@@ -221,6 +226,28 @@ impl Closest {
         self.cull = round_up(hit.t_high);
     }
 
+    /// Keeps a hit of the fast test, at most [`Closest::t_cull`] away, when it beats the best and `sink` accepts it.
+    #[inline(always)]
+    pub(super) fn keep_fast<K: HitSink>(&mut self, [t, u, v]: [f32; 3], prim: PrimId, sink: &K) {
+        let (instance, prim) = sink.key(prim);
+        if let Some((_, best_instance, best_prim)) = self.best
+            && t >= self.cull
+            && (t > self.cull || (instance, prim) >= (best_instance, best_prim))
+        {
+            return;
+        }
+        if !K::ACCEPTS_ALL && !sink.accept(&Hit { t, u, v, prim, instance }) {
+            return;
+        }
+        let (u, v) = (f64::from(u), f64::from(v));
+        let t_known = f64::from(t);
+        // Volumes over a D of 1, all without error: they round to what they are.
+        let quotients = Quotients { inv_det: 1.0, u, v, det_error: 0.0, uv_error: 0.0 };
+        let hit = TriangleHit { corners: [Vec3::ZERO; 3], t_low: t_known, t_high: t_known, quotients };
+        self.best = Some((hit, instance, prim));
+        (self.t_low, self.t_high, self.cull) = (t_known, t_known, t);
+    }
+
     /// Decides between hits whose bounds on t overlap.
     #[cold]
     #[inline(never)]
@@ -231,6 +258,17 @@ impl Closest {
             Ordering::Greater => false,
             Ordering::Equal => sink.key(prim) < (*best_instance, *best_prim),
         }
+    }
+}
+
+/// Tests one triangle, as the ray's forms say: whether it counts for an occlusion query.
+#[inline(always)]
+pub(super) fn is_blocked_by<K: HitSink>(ray: &TravRay, prims: &Triangles<'_>, prim: PrimId, sink: &K) -> bool {
+    if ray.forms.leaves == Precision::Fast {
+        let tuv = fast::test_one(&ray.range, prims.corners(prim), ray.range.t_far);
+        tuv.is_some_and(|tuv| fast::accepts(tuv, prim, sink))
+    } else {
+        TriangleHit::test(&ray.range, prims.corners(prim)).is_some_and(|hit| blocks(&hit, ray, prim, sink))
     }
 }
 

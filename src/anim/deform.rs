@@ -8,8 +8,15 @@
 use glam::{DAffine3, DVec3, Vec3};
 use rayon::prelude::*;
 
-use super::{Pose, pose::JointColumns};
+use super::{
+    Pose,
+    deform_fast::DeformFast,
+    pose::{JointColumns, JointRow},
+};
+#[cfg(doc)]
+use crate::geom::Forms;
 use crate::{
+    geom::Precision,
     scene::{Influences, MeshPart, PartInstance, Scene},
     simd::{Simd, SimdLevel, Task, dispatch},
 };
@@ -31,6 +38,8 @@ pub(super) enum Placement<'a> {
         influences: &'a Influences,
         /// Joint matrices.
         palette: &'a [JointColumns],
+        /// The same, rounded.
+        fast_palette: &'a [JointRow],
     },
 }
 
@@ -40,7 +49,7 @@ pub(super) fn placement<'a>(scene: &'a Scene, pose: &'a Pose, instance: PartInst
     if let (Some(skin), Some(influences)) = (node.skin, &scene.part(instance).influences) {
         let palette = pose.palette(skin);
         if !palette.is_empty() && influences.per_vertex > 0 {
-            return Placement::Skinned { influences, palette };
+            return Placement::Skinned { influences, palette, fast_palette: pose.fast_palette(skin) };
         }
     }
     Placement::Whole(world_from_instance(scene, pose, instance))
@@ -91,10 +100,30 @@ pub fn deform_range_at(
     first: usize,
     out: &mut [Vec3],
 ) {
+    deform_range_as(Precision::Exact, level, scene, pose, instance, first, out);
+}
+
+/// [`deform_range_at`] in a given precision: [`Precision::Fast`] works in `f32`, as [`Forms::deform`] says, and not quite to the same bits.
+///
+/// # Panics
+/// When the range goes past the part's vertices or the machine lacks `level`.
+pub fn deform_range_as(
+    precision: Precision,
+    level: SimdLevel,
+    scene: &Scene,
+    pose: &Pose,
+    instance: PartInstance,
+    first: usize,
+    out: &mut [Vec3],
+) {
     let part = scene.part(instance);
     assert!(first <= part.positions.len() && out.len() <= part.positions.len() - first, "range within the part");
     let weights = pose.weights(instance.node);
-    dispatch(level, Deform { part, weights, placement: placement(scene, pose, instance), first, out });
+    let placement = placement(scene, pose, instance);
+    match precision {
+        Precision::Exact => dispatch(level, Deform { part, weights, placement, first, out }),
+        Precision::Fast => dispatch(level, DeformFast { part, weights, placement, first, out }),
+    }
 }
 
 /// [`deform`] in parallel over ranges of vertices, in the current rayon pool, compiled for a given level. The same
@@ -103,13 +132,28 @@ pub fn deform_range_at(
 /// # Panics
 /// When `out` has another length than the part has vertices, or the machine lacks `level`.
 pub fn deform_parallel(level: SimdLevel, scene: &Scene, pose: &Pose, instance: PartInstance, out: &mut [Vec3]) {
+    deform_parallel_as(Precision::Exact, level, scene, pose, instance, out);
+}
+
+/// [`deform_parallel`] in a given precision, as [`deform_range_as`].
+///
+/// # Panics
+/// As there.
+pub fn deform_parallel_as(
+    precision: Precision,
+    level: SimdLevel,
+    scene: &Scene,
+    pose: &Pose,
+    instance: PartInstance,
+    out: &mut [Vec3],
+) {
     assert_eq!(out.len(), scene.part(instance).positions.len(), "one place a vertex");
     if out.len() <= DEFORM_GRAIN {
-        return deform_range_at(level, scene, pose, instance, 0, out);
+        return deform_range_as(precision, level, scene, pose, instance, 0, out);
     }
     out.par_chunks_mut(DEFORM_GRAIN)
         .enumerate()
-        .for_each(|(chunk, out)| deform_range_at(level, scene, pose, instance, chunk * DEFORM_GRAIN, out));
+        .for_each(|(chunk, out)| deform_range_as(precision, level, scene, pose, instance, chunk * DEFORM_GRAIN, out));
 }
 
 /// The vertices of [`deform`] before they are rounded: what its error is measured against.
@@ -168,7 +212,7 @@ impl<V: Kept> Task for Deform<'_, V> {
             morph(self.part, self.weights, first, rest);
             match self.placement {
                 Placement::Whole(matrix) => place(&JointColumns::from(&matrix), rest, world),
-                Placement::Skinned { influences, palette } => match influences.per_vertex {
+                Placement::Skinned { influences, palette, .. } => match influences.per_vertex {
                     4 => skin::<4>(influences, palette, first, rest, world),
                     8 => skin::<8>(influences, palette, first, rest, world),
                     _ => skin_any(influences, palette, first, rest, world),
@@ -228,7 +272,7 @@ fn skin<const N: usize>(
         let mut sum = weights.iter().fold(0.0, |sum, w| sum + w);
         let mut joints = *joints;
         if sum == 0.0 {
-            joints = [sole_joint(joints[0], palette); N];
+            joints = [sole_joint(joints[0], palette.len()); N];
             weights = std::array::from_fn(|k| if k == 0 { 1.0 } else { 0.0 });
             sum = 1.0;
         }
@@ -267,8 +311,8 @@ fn skin_any(
 
 /// The joint that a vertex follows whose weights sum to zero: its first, or the skin's first when there is no such
 /// joint.
-fn sole_joint(first: u16, palette: &[JointColumns]) -> u16 {
-    if usize::from(first) < palette.len() { first } else { 0 }
+pub(super) fn sole_joint(first: u16, count: usize) -> u16 {
+    if usize::from(first) < count { first } else { 0 }
 }
 
 /// The weighted sum of joint matrices, not divided, and the sum of the weights; the first joint's matrix and 1
@@ -277,7 +321,7 @@ fn sole_joint(first: u16, palette: &[JointColumns]) -> u16 {
 pub(super) fn blended(joints: &[u16], weights: &[f32], palette: &[JointColumns]) -> ([[f64; 4]; 4], f64) {
     let sum = weights.iter().fold(0.0, |sum, &w| sum + f64::from(w));
     if sum == 0.0 {
-        return (palette[usize::from(sole_joint(joints[0], palette))].0, 1.0);
+        return (palette[usize::from(sole_joint(joints[0], palette.len()))].0, 1.0);
     }
     let mut blend = [[0.0; 4]; 4];
     for (&joint, &weight) in joints.iter().zip(weights) {

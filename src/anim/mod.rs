@@ -7,6 +7,7 @@ mod bounds;
 mod class;
 mod clock;
 mod deform;
+mod deform_fast;
 mod left_out;
 mod normals;
 mod pose;
@@ -17,7 +18,10 @@ mod transform;
 pub use bounds::animation_bounds;
 pub use class::{MotionClass, classify};
 pub use clock::loop_time;
-pub use deform::{DEFORM_GRAIN, deform, deform_parallel, deform_range, deform_range_at, deform_unrounded};
+pub use deform::{
+    DEFORM_GRAIN, deform, deform_parallel, deform_parallel_as, deform_range, deform_range_as, deform_range_at,
+    deform_unrounded,
+};
 pub use left_out::{LeftOut, left_out};
 pub use normals::{vertex_normal, vertex_tangent};
 pub use pose::{ActiveClip, Pose};

@@ -52,7 +52,7 @@ pub fn vertex_tangent(scene: &Scene, pose: &Pose, instance: PartInstance, vertex
 fn vertex_matrix(scene: &Scene, pose: &Pose, instance: PartInstance, vertex: usize) -> DAffine3 {
     let (influences, palette) = match placement(scene, pose, instance) {
         Placement::Whole(matrix) => return matrix,
-        Placement::Skinned { influences, palette } => (influences, palette),
+        Placement::Skinned { influences, palette, .. } => (influences, palette),
     };
     let range = vertex * influences.per_vertex..(vertex + 1) * influences.per_vertex;
     let (columns, sum) = blended(&influences.joints[range.clone()], &influences.weights[range], palette);

@@ -29,6 +29,23 @@ impl From<&DAffine3> for JointColumns {
     }
 }
 
+/// A joint matrix rounded to `f32`: four columns of four, the last row 0.
+#[derive(Clone, Copy, Debug)]
+#[repr(C, align(64))]
+pub(super) struct JointRow(pub(super) [f32; 16]);
+
+impl From<&DAffine3> for JointRow {
+    /// Saturates.
+    #[expect(clippy::cast_possible_truncation, reason = "the rounding is what makes it fast")]
+    fn from(m: &DAffine3) -> Self {
+        let mut out = [0.0; 16];
+        for (to, from) in out.iter_mut().zip(JointColumns::from(m).0.as_flattened()) {
+            *to = from.clamp(f64::from(f32::MIN), f64::from(f32::MAX)) as f32;
+        }
+        Self(out)
+    }
+}
+
 /// No node of the driven list.
 const UNDRIVEN: u32 = u32::MAX;
 
@@ -64,6 +81,7 @@ pub struct Pose {
     weights: Vec<f64>,
     joint_matrices: Vec<DAffine3>,
     palette: Vec<JointColumns>,
+    fast_palette: Vec<JointRow>,
     /// Components of the driven nodes, as far as `active` says.
     trs: Vec<Trs>,
     active: Vec<bool>,
@@ -85,6 +103,7 @@ impl Pose {
             weights: layout.rest_weights.clone(),
             joint_matrices: vec![DAffine3::IDENTITY; joints],
             palette: vec![JointColumns::from(&DAffine3::IDENTITY); joints],
+            fast_palette: vec![JointRow::from(&DAffine3::IDENTITY); joints],
             trs: layout.rest_trs.clone(),
             active: vec![false; driven],
             was_active: vec![false; driven],
@@ -186,6 +205,7 @@ impl Pose {
                     let m = product(&self.world_from_node[joint.index()], &self.layout.inverse_bind[slot]);
                     self.joint_matrices[slot] = m;
                     self.palette[slot] = JointColumns::from(&m);
+                    self.fast_palette[slot] = JointRow::from(&m);
                 }
             }
         }
@@ -209,6 +229,11 @@ impl Pose {
     /// [`Pose::joint_matrices`] in the layout of the skinning kernel.
     pub(super) fn palette(&self, skin: SkinId) -> &[JointColumns] {
         &self.palette[self.layout.joint_ranges[skin.index()].clone()]
+    }
+
+    /// [`Pose::palette`] rounded to `f32`.
+    pub(super) fn fast_palette(&self, skin: SkinId) -> &[JointRow] {
+        &self.fast_palette[self.layout.joint_ranges[skin.index()].clone()]
     }
 }
 

@@ -63,8 +63,8 @@ pub(crate) struct CommonArgs {
     /// Structure over groups of triangles
     #[arg(long, global = true, value_name = "NAME", default_value = "bvh2", value_parser = values::top())]
     pub(crate) top: TopKind,
-    /// Precision of hits; exact is the only one there is
-    #[arg(long, global = true, value_name = "PRECISION", default_value = "exact", value_parser = precision)]
+    /// exact: hits proven right, the same bytes on every machine; fast: the cheapest form of each step, with errors
+    #[arg(long, global = true, value_name = "PRECISION", default_value = "exact", value_parser = values::precision())]
     pub(crate) precision: Precision,
     /// Instruction set of the kernels; changes no result
     #[arg(long, global = true, value_name = "LEVEL", default_value = "auto", value_parser = values::simd())]
@@ -88,14 +88,4 @@ const THREADS_HELP: &str = "Worker threads [default: KINORA_THREADS, else what t
 
 fn accel_help() -> String {
     format!("Structure over triangles, with its settings: NAME[:key=value,...]; there are {}", AccelKind::names())
-}
-
-fn precision(text: &str) -> Result<Precision, String> {
-    match text.parse() {
-        Ok(Precision::Exact) => Ok(Precision::Exact),
-        Ok(Precision::Fast) => {
-            Err("this version has exact kernels only; leave the option out or say `exact`".to_owned())
-        }
-        Err(_) => Err("expected `exact`".to_owned()),
-    }
 }

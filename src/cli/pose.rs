@@ -49,7 +49,8 @@ pub(crate) fn run(args: &PoseArgs, settings: &Settings) -> Result<(), CliError> 
     };
     atomic::prepare(&args.output)?;
     let mut file = AtomicFile::create(&args.output, &Unfinished::default())?;
-    let content = PosFile { scene: &scene, pose: &pose, clips, time_s: args.time, simd: settings.simd };
+    let Settings { precision, simd, .. } = *settings;
+    let content = PosFile { scene: &scene, pose: &pose, clips, time_s: args.time, precision, simd };
     settings
         .pool
         .install(|| content.write(&mut file))

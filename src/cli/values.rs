@@ -3,7 +3,12 @@
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use kinora::{
-    accel::AccelSpec, dynamics::RebuildPolicy, render::Shading, report::Kind, simd::SimdLevel, world::TopKind,
+    accel::{AccelSpec, Precision},
+    dynamics::RebuildPolicy,
+    render::Shading,
+    report::Kind,
+    simd::SimdLevel,
+    world::TopKind,
 };
 
 /// Longest side of a picture in pixels, and its largest area.
@@ -47,6 +52,11 @@ pub(crate) enum SimdChoice {
 pub(crate) fn simd() -> impl TypedValueParser<Value = SimdChoice> {
     let [a, b, c] = SimdLevel::ALL.map(|l| (l.name(), SimdChoice::Level(l)));
     named([("auto", SimdChoice::Auto), a, b, c])
+}
+
+/// How exact answers are.
+pub(crate) fn precision() -> impl TypedValueParser<Value = Precision> {
+    named(Precision::ALL.map(|p| (p.name(), p)))
 }
 
 /// The level over groups.

@@ -131,7 +131,7 @@ impl FrameLoop {
 
         let began = Instant::now();
         let span = tracing::info_span!("deform", frame).entered();
-        self.counts.deforms += self.stage.deform();
+        self.counts.deforms += self.stage.deform(self.config.forms.deform);
         drop(span);
         times.deform = began.elapsed();
 

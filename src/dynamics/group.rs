@@ -12,6 +12,7 @@ use super::{
 };
 use crate::{
     accel::{AccelSpec, AnyAccel, Refit},
+    geom::Precision,
     world::GroupFrame,
 };
 
@@ -83,7 +84,7 @@ impl Group {
     }
 
     /// Computes the vertices when the poses of this frame call for it.
-    pub(super) fn deform(&mut self, actors: &[Actor]) {
+    pub(super) fn deform(&mut self, precision: Precision, actors: &[Actor]) {
         self.deformed = self.accel.is_none() || self.moved(actors);
         if !self.deformed {
             return;
@@ -91,7 +92,7 @@ impl Group {
         let count = self.shape.layout.vertex_count;
         let mut next = self.position_pool.take(|| vec![Vec3::ZERO; count]);
         let out = Arc::get_mut(&mut next).expect("a taken buffer has one owner");
-        deform_chunks(&self.shape.chunks, actors, out);
+        deform_chunks(precision, &self.shape.chunks, actors, out);
         self.position_pool.keep(next.clone());
         self.positions = next;
         self.moved_since_build = true;

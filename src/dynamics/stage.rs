@@ -13,7 +13,7 @@ use super::{
 use crate::{
     accel::AccelSpec,
     anim::ActiveClip,
-    geom::InstanceId,
+    geom::{InstanceId, Precision},
     scene::Scene,
     world::{ActorFrame, Place, TopKind, World, WorldInstance},
 };
@@ -150,11 +150,11 @@ impl Stage {
     }
 
     /// Computes the vertices of every group that moved; the number of groups.
-    pub(super) fn deform(&mut self) -> u64 {
+    pub(super) fn deform(&mut self, precision: Precision) -> u64 {
         let actors = &self.actors;
         match &mut self.groups[..] {
-            [only] => only.deform(actors),
-            groups => groups.par_iter_mut().for_each(|group| group.deform(actors)),
+            [only] => only.deform(precision, actors),
+            groups => groups.par_iter_mut().for_each(|group| group.deform(precision, actors)),
         }
         self.groups.iter().map(|group| u64::from(group.deformed())).sum()
     }

@@ -57,6 +57,12 @@ impl Aabb {
         e.x * e.y + e.y * e.z + e.z * e.x
     }
 
+    /// Greatest absolute coordinate; 0 for an empty box.
+    #[inline(always)]
+    pub fn reach(self) -> f32 {
+        if self.is_empty() { 0.0 } else { self.min.abs().max(self.max.abs()).max_element() }
+    }
+
     /// Length of the space diagonal; 0 for an empty box.
     pub fn diagonal(self) -> f32 {
         if self.is_empty() { 0.0 } else { self.extent().length() }

@@ -49,7 +49,7 @@ pub struct Forms {
     /// Triangles that a ray may hit. Fast: Möller and Trumbore's test in `f32` without bounds, so a ray may slip through a shared edge,
     /// hit a triangle that it passes by, or find the wrong one first; t, u and v are off by more than a rounding. In every structure over triangles.
     pub leaves: Precision,
-    /// Vertices of parts that move. Fast: morphed and skinned in `f32`, the joint matrices rounded.
+    /// Vertices. Fast: morphed and skinned in `f32`, the joint matrices rounded.
     pub deform: Precision,
     /// Where secondary rays start. Fast: a fixed number of roundings off the surface, not the bound of the hit's own error.
     pub offset: Precision,

@@ -9,7 +9,8 @@ use glam::Vec3;
 use serde::{Serialize, Serializer};
 
 use crate::{
-    anim::{Pose, deform_parallel},
+    anim::{Pose, deform_parallel_as},
+    geom::Precision,
     scene::{ClipId, PartInstance, Scene},
     simd::SimdLevel,
 };
@@ -67,6 +68,8 @@ pub struct PosFile<'a> {
     pub clips: PosClips,
     /// The time that the pose was evaluated at in seconds, finite; goes into the header.
     pub time_s: f64,
+    /// How vertices are computed.
+    pub precision: Precision,
     /// SIMD level of the deform kernel; changes no byte.
     pub simd: SimdLevel,
 }
@@ -84,7 +87,7 @@ impl PosFile<'_> {
         let mut bytes = Vec::new();
         for &instance in &self.scene.instances {
             positions.resize(self.scene.part(instance).positions.len(), Vec3::ZERO);
-            deform_parallel(self.simd, self.scene, self.pose, instance, &mut positions);
+            deform_parallel_as(self.precision, self.simd, self.scene, self.pose, instance, &mut positions);
             bytes.clear();
             bytes.extend(positions.iter().flat_map(Vec3::to_array).flat_map(|x| f64::from(x).to_le_bytes()));
             out.write_all(&bytes)?;

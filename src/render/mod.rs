@@ -23,6 +23,7 @@ mod found;
 mod lights;
 mod material;
 mod math;
+mod offset;
 mod patch;
 mod pattern;
 mod plain;

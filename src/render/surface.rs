@@ -7,15 +7,18 @@ use super::{
     departure::Departure,
     found::{Maps, Placed, Spots},
     material::Channel,
+    offset::pushed,
     patch::Patch,
     wide::{Floats, V3},
 };
+use crate::geom::Precision;
 
 /// Surface points ready for shading, a lane each.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Surface<'p, F> {
     pub(crate) point: V3<F>,
-    departure: Departure<'p, F>,
+    /// How rays leave; `None` where a fixed way off the surface does.
+    departure: Option<Departure<'p, F>>,
     /// Unit geometric normal on the viewer's side.
     pub(crate) n_geom: V3<F>,
     /// Unit shading normal on the viewer's side, never turned away from the viewer.
@@ -43,7 +46,8 @@ impl<'p, F: Floats> Surface<'p, F> {
         let (zero, one) = (F::splat(0.0), F::splat(1.0));
         let view = (-dir).unit_or(V3::splat(Vec3::Z));
         let point = patch.blend3(patch.corners);
-        let departure = Departure::new(patch, point, spots.mask);
+        let exact = ctx.world.forms().offset == Precision::Exact;
+        let departure = if exact { Some(Departure::new(patch, point, spots.mask)) } else { None };
         let side = F::select(spots.lanes(|spot| spot.info.mirrored), -one, one);
         // Outward by the file's winding, before it is turned to the viewer.
         let outward = (patch.cross * side).unit_or(view);
@@ -70,7 +74,11 @@ impl<'p, F: Floats> Surface<'p, F> {
     /// Where rays that leave along `dir` start.
     #[inline(always)]
     pub(crate) fn origin(&self, dir: V3<F>) -> V3<F> {
-        self.departure.origin(self.n_geom, dir)
+        if let Some(departure) = &self.departure {
+            return departure.origin(self.n_geom, dir);
+        }
+        let away = V3::select(dir.dot(self.n_geom).lt(F::splat(0.0)), -self.n_geom, self.n_geom);
+        pushed(self.point, away)
     }
 
     /// [`Surface::origin`] for shadow rays: lifted to the smooth surface, so that facets do not shadow themselves.

@@ -96,8 +96,7 @@ impl Bvh2 {
     fn take_positions(&mut self, prims: &Triangles<'_>) {
         self.swept = refit::refit(&mut self.pairs, &mut self.blocks, prims);
         self.bounds = self.pairs[0].union();
-        let reach = self.bounds.min.abs().max(self.bounds.max.abs()).max_element();
-        self.reach = if self.bounds.is_empty() { 0.0 } else { reach };
+        self.reach = self.bounds.reach();
     }
 
     /// Expected cost of a ray, in units of the triangles' own area. The root's area, which an explosion makes grow as

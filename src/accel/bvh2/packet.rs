@@ -8,18 +8,17 @@ use crate::{
     accel::{
         Closest, Counter, HitSink, TravRay,
         packet::{PACKET, PacketRays},
-        query::{GROW, ORDINARY_MAX, SHRINK, SLACK},
+        query::SLACK,
         run,
+        slabs::{self, Extent, Slab},
     },
-    geom::Triangles,
+    geom::{Precision, Triangles},
     simd::{Lanes, Simd},
 };
 
-/// Rays of common direction signs, one to a lane, against single boxes. The proof at `FastNode` holds lane by lane.
+/// Rays of common direction signs, one to a lane, against single boxes. The proof at [`Slab`] holds lane by lane.
 struct PacketNode<S: Simd> {
-    origin: [S::F; 3],
-    inv_near: [S::F; 3],
-    inv_far: [S::F; 3],
+    slabs: [Slab<S::F>; 3],
     backward: [bool; 3],
     t_near: S::F,
     limit: S::F,
@@ -27,15 +26,15 @@ struct PacketNode<S: Simd> {
 
 impl<S: Simd> PacketNode<S> {
     #[inline(always)]
-    fn new(packet: &PacketRays) -> Self {
-        let dir = load3::<S>(&packet.dir32);
-        // As `TravRay::new`.
-        let inv = [S::F::splat(1.0) / dir[0], S::F::splat(1.0) / dir[1], S::F::splat(1.0) / dir[2]];
-        let (shrink, grow) = (S::F::splat(SHRINK), S::F::splat(GROW));
+    fn new(packet: &PacketRays, reach: f32, nodes: Precision) -> Self {
+        let (origin, dir) = (load3::<S>(&packet.origin32), load3::<S>(&packet.dir32));
+        let extent = Extent::new(origin, dir, reach);
         Self {
-            origin: load3::<S>(&packet.origin32),
-            inv_near: [inv[0] * shrink, inv[1] * shrink, inv[2] * shrink],
-            inv_far: [inv[0] * grow, inv[1] * grow, inv[2] * grow],
+            slabs: [
+                Slab::new(origin[0], dir[0], &extent, nodes),
+                Slab::new(origin[1], dir[1], &extent, nodes),
+                Slab::new(origin[2], dir[2], &extent, nodes),
+            ],
             backward: [packet.dir32[0][0] < 0.0, packet.dir32[1][0] < 0.0, packet.dir32[2][0] < 0.0],
             t_near: S::F::load(&packet.t_near32),
             limit: S::F::load(&packet.t_cull),
@@ -48,10 +47,10 @@ impl<S: Simd> PacketNode<S> {
         let (mut near, mut far) = (self.t_near, self.limit);
         for axis in 0..3 {
             let (entry, exit) = if self.backward[axis] { (child + 2, child) } else { (child, child + 2) };
-            let entry = S::F::splat(pair.planes[axis][entry]) - self.origin[axis];
-            let exit = S::F::splat(pair.planes[axis][exit]) - self.origin[axis];
-            near = (entry * self.inv_near[axis]).max(near);
-            far = (exit * self.inv_far[axis]).min(far);
+            let (entry, exit) = (S::F::splat(pair.planes[axis][entry]), S::F::splat(pair.planes[axis][exit]));
+            let slab = &self.slabs[axis];
+            near = entry.mul_add_loose(slab.entry_mul, slab.entry_add).max(near);
+            far = exit.mul_add_loose(slab.exit_mul, slab.exit_add).min(far);
         }
         ((near - far).le(S::F::splat(SLACK)), near)
     }
@@ -91,7 +90,7 @@ impl Bvh2 {
     /// True when the rays can be walked together.
     #[inline(always)]
     fn takes_packet(&self, rays: &[TravRay], active: u32) -> bool {
-        active.count_ones() > 2 && self.reach <= ORDINARY_MAX && rays.iter().all(TravRay::is_ordinary) && agree(rays)
+        active.count_ones() > 2 && rays.iter().all(|ray| slabs::fits(ray, self.reach)) && agree(rays)
     }
 
     #[inline(always)]
@@ -125,11 +124,11 @@ impl Bvh2 {
         sinks: &[K],
         count: &mut C,
     ) {
-        let mut packet = PacketRays::new(rays);
+        let mut packet = PacketRays::new(rays, self.reach);
         for (i, best) in best.iter().enumerate() {
             packet.set_limit(i, best);
         }
-        let mut node = PacketNode::<S>::new(&packet);
+        let mut node = PacketNode::<S>::new(&packet, self.reach, rays[0].forms().nodes);
         let mut stack = Stack::<S>::new();
         let (mut link, mut mask) = (Link::inner(0), active);
         loop {
@@ -189,8 +188,8 @@ impl Bvh2 {
         sinks: &[K],
         count: &mut C,
     ) -> u32 {
-        let packet = PacketRays::new(rays);
-        let node = PacketNode::<S>::new(&packet);
+        let packet = PacketRays::new(rays, self.reach);
+        let node = PacketNode::<S>::new(&packet, self.reach, rays[0].forms().nodes);
         let mut stack = Stack::<S>::new();
         let mut open = active;
         let (mut link, mut mask) = (Link::inner(0), active);

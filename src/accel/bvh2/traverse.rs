@@ -5,11 +5,7 @@ use super::{
     node::{Link, Pair},
 };
 use crate::{
-    accel::{
-        Closest, Counter, HitSink, TravRay,
-        block::BlockRay,
-        query::{GROW, ORDINARY_MAX, SHRINK, SLACK},
-    },
+    accel::{Closest, Counter, HitSink, TravRay, block::BlockRay, query::SLACK, slabs},
     simd::{Halves, Lanes, Scalar, Simd, branch_barrier},
 };
 
@@ -30,22 +26,12 @@ trait NodeTest: Copy {
     fn may_matter(&self, t_entry: Self::T) -> bool;
 }
 
-/// Both boxes of a pair at once, in four lanes: entry into 0, entry into 1, and the negated exits.
-///
-/// # Proof that no box is missed
-/// Take an ordinary ray ([`TravRay::is_ordinary`]) and a box within 2^60 of 0. On an axis with `d != 0` the lanes hold
-/// `a = fl(fl(near - o) * fl(inv * SHRINK))` and `b = fl(fl(far - o) * fl(inv * GROW))`; nothing overflows (2^61 * 2^61) and only the
-/// products may underflow, by less than 2^-149. By the bounds of [`SHRINK`] and [`GROW`], `a` is at most the
-/// exact entry where that is not negative, and negative or 0 elsewhere, where the ray's `t_near >= 0` takes its place in
-/// the maximum; `b` is at least the exact exit where that is not negative, and a negative exit misses in truth. So with
-/// 2^-126 of slack on the comparison an exact meeting within `[t_near, limit]` is never lost. On an axis with `d = 0`
-/// (always +0) the reciprocal is +inf: a plane on the wrong side gives +inf in its lane and the box is missed, as it is
-/// in truth; a plane on the right side gives -inf, and the origin on a plane 0 * inf = NaN: both lose in the maximum,
-/// whose second operand is the running value.
+/// Both boxes of a pair at once, in four lanes: entry into 0, entry into 1, and the negated exits. The proof at [`slabs::Slab`] holds lane by
+/// lane; with 2^-126 of slack on the comparison an exact meeting within `[t_near, limit]` is never lost.
 #[derive(Clone, Copy)]
 struct FastNode<S: Simd> {
-    origin: [S::F4; 3],
-    inv: [S::F4; 3],
+    mul: [S::F4; 3],
+    add: [S::F4; 3],
     swap: [<S::F4 as Halves>::Swap; 3],
     /// `[t_near, t_near, -limit, -limit]`.
     limits: S::F4,
@@ -54,17 +40,30 @@ struct FastNode<S: Simd> {
     cull: f32,
 }
 
+/// Entries, then negated exits.
+#[inline(always)]
+fn lanes<S: Simd>(entry: f32, exit: f32) -> S::F4 {
+    S::F4::load(&[entry, entry, -exit, -exit])
+}
+
 impl<S: Simd> FastNode<S> {
     #[inline(always)]
-    fn new(ray: &TravRay, limit: f32) -> Self {
-        let range = ray.range();
-        let (origin, inv, dir) = (range.origin, ray.inv(), range.dir);
-        let widen = S::F4::load(&[SHRINK, SHRINK, -GROW, -GROW]);
+    fn new(ray: &TravRay, reach: f32, limit: f32) -> Self {
+        let (range, [x, y, z]) = (ray.range(), slabs::of_ray::<S>(ray, reach));
+        let dir = range.dir;
         Self {
-            origin: [S::F4::splat(origin.x), S::F4::splat(origin.y), S::F4::splat(origin.z)],
-            inv: [S::F4::splat(inv.x) * widen, S::F4::splat(inv.y) * widen, S::F4::splat(inv.z) * widen],
+            mul: [
+                lanes::<S>(x.entry_mul, x.exit_mul),
+                lanes::<S>(y.entry_mul, y.exit_mul),
+                lanes::<S>(z.entry_mul, z.exit_mul),
+            ],
+            add: [
+                lanes::<S>(x.entry_add, x.exit_add),
+                lanes::<S>(y.entry_add, y.exit_add),
+                lanes::<S>(z.entry_add, z.exit_add),
+            ],
             swap: [S::F4::swap(dir.x < 0.0), S::F4::swap(dir.y < 0.0), S::F4::swap(dir.z < 0.0)],
-            limits: S::F4::load(&[range.t_near, range.t_near, -limit, -limit]),
+            limits: lanes::<S>(range.t_near, limit),
             t_near: range.t_near,
             cull: limit + SLACK,
         }
@@ -79,7 +78,7 @@ impl<S: Simd> NodeTest for FastNode<S> {
         let mut t = self.limits;
         for axis in 0..3 {
             let planes = S::F4::load(&pair.planes[axis]).swapped(self.swap[axis]);
-            t = ((planes - self.origin[axis]) * self.inv[axis]).max(t);
+            t = planes.mul_add_loose(self.mul[axis], self.add[axis]).max(t);
         }
         let hits = (t + t.high_half()).le(S::F4::splat(SLACK)) & 3;
         (hits, [t.first(), t.second()])
@@ -88,7 +87,7 @@ impl<S: Simd> NodeTest for FastNode<S> {
     #[inline(always)]
     fn limit(&mut self, best: &Closest) {
         let limit = best.t_cull();
-        self.limits = S::F4::load(&[self.t_near, self.t_near, -limit, -limit]);
+        self.limits = lanes::<S>(self.t_near, limit);
         self.cull = limit + SLACK;
     }
 
@@ -160,12 +159,6 @@ fn predicted(link: Link) -> Link {
 }
 
 impl Bvh2 {
-    /// True when f32 node tests are proven for this ray and these boxes.
-    #[inline(always)]
-    pub(super) fn is_ordinary(&self, ray: &TravRay) -> bool {
-        ray.is_ordinary() && self.reach <= ORDINARY_MAX
-    }
-
     #[inline(always)]
     pub(super) fn walk_closest<S: Simd, C: Counter, K: HitSink>(
         &self,
@@ -174,8 +167,8 @@ impl Bvh2 {
         sink: &K,
         count: &mut C,
     ) {
-        if self.is_ordinary(ray) {
-            self.closest_with::<S, _, C, K>(FastNode::<S>::new(ray, best.t_cull()), ray, best, sink, count);
+        if slabs::fits(ray, self.reach) {
+            self.closest_with::<S, _, C, K>(FastNode::<S>::new(ray, self.reach, best.t_cull()), ray, best, sink, count);
         } else {
             self.walk_closest_wide(ray, best, sink, count);
         }
@@ -195,8 +188,8 @@ impl Bvh2 {
         sink: &K,
         count: &mut C,
     ) -> bool {
-        if self.is_ordinary(ray) {
-            self.occluded_with::<S, _, C, K>(&FastNode::<S>::new(ray, ray.range().t_far), ray, sink, count)
+        if slabs::fits(ray, self.reach) {
+            self.occluded_with::<S, _, C, K>(&FastNode::<S>::new(ray, self.reach, ray.range().t_far), ray, sink, count)
         } else {
             self.walk_occluded_wide(ray, sink, count)
         }
@@ -219,7 +212,7 @@ impl Bvh2 {
         sink: &K,
         count: &mut C,
     ) {
-        let block_ray = BlockRay::new(ray);
+        let block_ray = BlockRay::new(ray, self.reach);
         let mut stack = Stack::<N::T>::new();
         let mut link = Link::inner(0);
         loop {
@@ -272,7 +265,7 @@ impl Bvh2 {
         sink: &K,
         count: &mut C,
     ) -> bool {
-        let block_ray = BlockRay::new(ray);
+        let block_ray = BlockRay::new(ray, self.reach);
         let mut stack = Stack::<()>::new();
         let mut link = Link::inner(0);
         loop {

@@ -102,6 +102,11 @@ impl Tree for Bvh8 {
     type Node = Node;
 
     #[inline(always)]
+    fn reach(&self) -> f32 {
+        self.reach
+    }
+
+    #[inline(always)]
     fn node(&self, number: usize) -> &Node {
         &self.nodes[number]
     }
@@ -160,8 +165,7 @@ impl Bvh8 {
         let all = Subtree { nodes, blocks, first_node: 0, first_block: 0, store: IntoNodes, span: Link::span };
         let swept = all.refit(prims);
         (self.cost, self.own_area, self.bounds) = (swept.cost, swept.own_area, swept.aabb);
-        let reach = self.bounds.min.abs().max(self.bounds.max.abs()).max_element();
-        self.reach = if self.bounds.is_empty() { 0.0 } else { reach };
+        self.reach = self.bounds.reach();
     }
 
     /// Expected cost of a ray, in units of the triangles' own area. The root's area, which an explosion makes grow as

@@ -182,7 +182,7 @@ impl Bvh8 {
         sinks: &[K],
         count: &mut C,
     ) {
-        let mut packet = PacketRays::new(rays);
+        let mut packet = PacketRays::new(rays, self.reach);
         for (i, best) in best.iter().enumerate() {
             packet.set_limit(i, best);
         }
@@ -207,7 +207,7 @@ impl Bvh8 {
                 let (members, backward) = packet::group(|ray| self.is_ordinary(ray), rays, left);
                 left &= !members;
                 if members.count_ones() > FEW {
-                    let packet = PacketRays::new(rays);
+                    let packet = PacketRays::new(rays, self.reach);
                     let together = Packet::<S>::new(&packet, members, backward);
                     let root = Entry { word: Self::root(), mask: members, mark: (), rays: together.near };
                     let hits = packet::occluded::<S, _, _, C, K>(self, &together, root, rays, &packet, sinks, count);
@@ -230,7 +230,7 @@ impl Bvh8 {
 pub(super) fn met_together<S: Simd>(ray: &TravRay, node: &Node) -> [u32; 2] {
     let rays = [*ray; 3];
     let dir = ray.range().dir;
-    let together = Packet::<S>::new(&PacketRays::new(&rays), 7, [dir.x < 0.0, dir.y < 0.0, dir.z < 0.0]);
+    let together = Packet::<S>::new(&PacketRays::new(&rays, 0.0), 7, [dir.x < 0.0, dir.y < 0.0, dir.z < 0.0]);
     let mut entries = [0.0; WIDTH];
     let all = together.all(node, (), &mut entries);
     let mut each = 0;

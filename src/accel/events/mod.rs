@@ -47,10 +47,10 @@ use state::Seat;
 
 use super::{
     Accel, AccelStats, BuildError, Closest, Counter, HitSink, Refit, TravRay, Violation, Visitor, check_indices,
-    query::blocks,
+    query::is_blocked_by,
 };
 use crate::{
-    geom::{Aabb, PrimId, Triangles, exact::TriangleHit},
+    geom::{Aabb, PrimId, Triangles},
     simd::Simd,
 };
 use boxes::MAX_OBJECTS;
@@ -112,9 +112,7 @@ impl<K: HitSink> Visitor for Block<'_, K> {
     #[inline(always)]
     fn visit(&mut self, object: u32) -> bool {
         let prim = PrimId(object);
-        if let Some(hit) = TriangleHit::test(self.ray.range(), self.prims.corners(prim)) {
-            self.blocked = blocks(&hit, self.ray, prim, self.sink);
-        }
+        self.blocked |= is_blocked_by(self.ray, self.prims, prim, self.sink);
         self.blocked
     }
 }

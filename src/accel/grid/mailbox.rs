@@ -3,8 +3,8 @@
 use std::ops::Range;
 
 use crate::{
-    accel::{Closest, Counter, HitSink, TravRay, block::NO_PRIM, leaves::Leaves, query::blocks},
-    geom::{PrimId, Triangles, exact::TriangleHit},
+    accel::{Closest, Counter, HitSink, TravRay, block::NO_PRIM, leaves::Leaves, query::is_blocked_by},
+    geom::{PrimId, Triangles},
 };
 
 /// Triangles that a mailbox remembers; a power of two.
@@ -109,8 +109,7 @@ impl<K: HitSink> Leaves for MailedOccluded<'_, K> {
                 continue;
             }
             count.prim();
-            let hit = TriangleHit::test(self.ray.range(), self.prims.corners(PrimId(id)));
-            if hit.is_some_and(|hit| blocks(&hit, self.ray, PrimId(id), self.sink)) {
+            if is_blocked_by(self.ray, self.prims, PrimId(id), self.sink) {
                 return true;
             }
         }

@@ -305,7 +305,11 @@ impl Accel for Grid {
     ) {
         match &self.owned {
             Owned::Blocks(blocks) => {
-                self.cells.walk(ray, &mut ClosestLeaves::<S, K>::new(blocks, ray, best, sink), count);
+                self.cells.walk(
+                    ray,
+                    &mut ClosestLeaves::<S, K>::new(blocks, self.cells.bounds.reach(), ray, best, sink),
+                    count,
+                );
             }
             Owned::Ids(ids) => {
                 self.cells.walk(ray, &mut MailedClosest::new(ids, prims, ray, best, sink), count);
@@ -322,7 +326,11 @@ impl Accel for Grid {
         count: &mut C,
     ) -> bool {
         match &self.owned {
-            Owned::Blocks(blocks) => self.cells.walk(ray, &mut OccludedLeaves::<S, K>::new(blocks, ray, sink), count),
+            Owned::Blocks(blocks) => self.cells.walk(
+                ray,
+                &mut OccludedLeaves::<S, K>::new(blocks, self.cells.bounds.reach(), ray, sink),
+                count,
+            ),
             Owned::Ids(ids) => self.cells.walk(ray, &mut MailedOccluded::new(ids, prims, ray, sink), count),
         }
     }

@@ -23,10 +23,7 @@ use super::{
     block::TriBlock,
     check_indices,
     grid::lattice::Lattice,
-    kdtree::{
-        self,
-        node::{KdNode, MAX_NUMBER},
-    },
+    kdtree::node::{KdNode, MAX_NUMBER},
     leaves::{ClosestLeaves, OccludedLeaves, pack},
 };
 use crate::{
@@ -121,7 +118,7 @@ impl Accel for Grug {
         check_indices(Self::NAME, prims, MAX_OBJECTS)?;
         let Built { bounds, lattice, hash, table, nodes, items, groups } = build::build(prims, config);
         let blocks = pack(&items, prims);
-        let (reach, prim_count) = (kdtree::reach(&bounds), prims.len());
+        let (reach, prim_count) = (bounds.reach(), prims.len());
         Ok(Self { bounds, reach, lattice, hash, mode: config.mode, table, nodes, groups, blocks, prim_count })
     }
 
@@ -139,7 +136,7 @@ impl Accel for Grug {
         sink: &K,
         count: &mut C,
     ) {
-        self.walk(ray, &mut ClosestLeaves::<S, K>::new(&self.blocks, ray, best, sink), count);
+        self.walk(ray, &mut ClosestLeaves::<S, K>::new(&self.blocks, self.reach, ray, best, sink), count);
     }
 
     #[inline(always)]
@@ -150,7 +147,7 @@ impl Accel for Grug {
         sink: &K,
         count: &mut C,
     ) -> bool {
-        self.walk(ray, &mut OccludedLeaves::<S, K>::new(&self.blocks, ray, sink), count)
+        self.walk(ray, &mut OccludedLeaves::<S, K>::new(&self.blocks, self.reach, ray, sink), count)
     }
 
     fn validate(&self, prims: &Triangles<'_>) -> Result<(), Violation> {

@@ -118,7 +118,7 @@ impl Tree {
         };
         let mut out = Emitted::default();
         Builder { shapes, params: config.params(unit), unit }.emit(task, &mut out);
-        (Self { nodes: out.nodes, bounds, reach: reach(&bounds) }, out.items)
+        (Self { nodes: out.nodes, bounds, reach: bounds.reach() }, out.items)
     }
 
     #[inline(always)]
@@ -166,11 +166,6 @@ impl Tree {
         }
         stats
     }
-}
-
-/// Greatest absolute coordinate; 0 for an empty box.
-pub(super) fn reach(bounds: &Aabb) -> f32 {
-    if bounds.is_empty() { 0.0 } else { bounds.min.abs().max(bounds.max.abs()).max_element() }
 }
 
 /// A kd-tree over plain boxes, which leaves the objects to a [`Visitor`].
@@ -245,7 +240,7 @@ impl Accel for KdTree {
         sink: &K,
         count: &mut C,
     ) {
-        self.tree.walk(ray, &mut ClosestLeaves::<S, K>::new(&self.blocks, ray, best, sink), count);
+        self.tree.walk(ray, &mut ClosestLeaves::<S, K>::new(&self.blocks, self.tree.reach, ray, best, sink), count);
     }
 
     #[inline(always)]
@@ -256,7 +251,7 @@ impl Accel for KdTree {
         sink: &K,
         count: &mut C,
     ) -> bool {
-        self.tree.walk(ray, &mut OccludedLeaves::<S, K>::new(&self.blocks, ray, sink), count)
+        self.tree.walk(ray, &mut OccludedLeaves::<S, K>::new(&self.blocks, self.tree.reach, ray, sink), count)
     }
 
     fn validate(&self, prims: &Triangles<'_>) -> Result<(), Violation> {

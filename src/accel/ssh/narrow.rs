@@ -120,8 +120,7 @@ impl Narrow {
         }
         self.own_area = swept.own_area;
         self.bounds = swept.aabb;
-        let reach = self.bounds.min.abs().max(self.bounds.max.abs()).max_element();
-        self.reach = if self.bounds.is_empty() { 0.0 } else { reach };
+        self.reach = self.bounds.reach();
     }
 
     /// Expected cost of a ray, in units of the triangles' own area.

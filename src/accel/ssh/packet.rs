@@ -216,7 +216,7 @@ impl Narrow {
         sinks: &[K],
         count: &mut C,
     ) {
-        let mut packet = PacketRays::new(rays);
+        let mut packet = PacketRays::new(rays, self.reach);
         for (i, best) in best.iter().enumerate() {
             packet.set_limit(i, best);
         }
@@ -295,7 +295,7 @@ impl Narrow {
         sinks: &[K],
         count: &mut C,
     ) -> u32 {
-        let packet = PacketRays::new(rays);
+        let packet = PacketRays::new(rays, self.reach);
         let slabs = PacketSlabs::<S>::new(&packet, backward);
         let mut segments = slabs.clipped(&self.bounds);
         let (mut word, mut mask) = (self.root, active & segments.open());
@@ -341,7 +341,7 @@ impl Narrow {
 #[cfg(test)]
 #[inline(always)]
 pub(super) fn cut_once<S: Simd>(ray: &TravRay, plane: f32, side: Side) -> Option<[f64; 2]> {
-    let packet = PacketRays::new(std::slice::from_ref(ray));
+    let packet = PacketRays::new(std::slice::from_ref(ray), 0.0);
     let slabs = PacketSlabs::<S>::new(&packet, ray.range().dir.to_array().map(|d| d < 0.0));
     let segments = slabs.cut(plane, side, Segments { near: slabs.t_near, far: slabs.limit });
     let mut rows = [[0.0; PACKET]; 2];

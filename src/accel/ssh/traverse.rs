@@ -304,7 +304,7 @@ impl Narrow {
         if !N::is_open(segment) {
             return;
         }
-        let block_ray = BlockRay::new(ray);
+        let block_ray = BlockRay::new(ray, self.reach);
         let mut stack = Stack::<N::T>::new();
         let mut word = self.root;
         loop {
@@ -349,7 +349,7 @@ impl Narrow {
         if !N::is_open(segment) {
             return false;
         }
-        let block_ray = BlockRay::new(ray);
+        let block_ray = BlockRay::new(ray, self.reach);
         let mut stack = Stack::<N::T>::new();
         let mut word = self.root;
         loop {

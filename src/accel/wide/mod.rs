@@ -14,6 +14,8 @@ pub(super) trait Tree {
     /// A node.
     type Node: WideNode;
 
+    /// Greatest absolute coordinate of the triangles.
+    fn reach(&self) -> f32;
     /// A node by its number.
     fn node(&self, number: usize) -> &Self::Node;
     /// Blocks of a leaf that has some; its triangles are counted.

@@ -70,7 +70,7 @@ pub(in crate::accel) fn closest<S: Simd, T: Tree, N: Kernel<T>, C: Counter, K: H
     sink: &K,
     count: &mut C,
 ) {
-    let block_ray = BlockRay::new(ray);
+    let block_ray = BlockRay::new(ray, tree.reach());
     let mut stack = Stack::<T, N::Mark>::new();
     let mut kids = N::kids();
     loop {
@@ -166,7 +166,7 @@ pub(in crate::accel) fn occluded<S: Simd, T: Tree, N: Kernel<T>, C: Counter, K: 
     sink: &K,
     count: &mut C,
 ) -> bool {
-    let block_ray = BlockRay::new(ray);
+    let block_ray = BlockRay::new(ray, tree.reach());
     let mut stack = Stack::<T, N::Mark>::new();
     let mut kids = N::kids();
     loop {

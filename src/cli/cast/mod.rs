@@ -88,6 +88,7 @@ pub(crate) fn run(args: &CastArgs, settings: &Settings) -> Result<(), CliError> 
         accel: &accel,
         prims: frames.last(),
         simd: settings.simd,
+        precision: settings.precision,
         any_hit: args.any_hit,
         packet: args.packet,
     };
@@ -105,7 +106,7 @@ pub(crate) fn run(args: &CastArgs, settings: &Settings) -> Result<(), CliError> 
         accel: spec.to_string(),
         build: &args.build,
         layout: &args.layout,
-        precision: "exact",
+        precision: settings.precision.name(),
         triangles: frames.indices.len(),
         build_ms,
         refit_ms,
@@ -124,7 +125,7 @@ impl Summary<'_> {
     fn text(&self) -> String {
         let refit = self.refit_ms.map_or(String::new(), |ms| format!(", refit {ms:.3} ms"));
         format!(
-            "{} triangles in {}: build {:.3} ms{refit}, {} bytes\n{} rays, {} hits: {:.3} million rays a second ({} threads, {})\n",
+            "{} triangles in {}: build {:.3} ms{refit}, {} bytes\n{} rays, {} hits: {:.3} million rays a second ({} threads, {}, {})\n",
             self.triangles,
             self.accel,
             self.build_ms,
@@ -133,7 +134,8 @@ impl Summary<'_> {
             self.hits,
             self.mrays_per_s,
             self.threads,
-            self.simd
+            self.simd,
+            self.precision
         )
     }
 }

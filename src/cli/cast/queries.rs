@@ -3,7 +3,7 @@
 use std::{path::Path, time::Instant};
 
 use kinora::{
-    accel::{AnyAccel, AnyHit, Closest, PACKET, TravRay},
+    accel::{AnyAccel, AnyHit, Closest, PACKET, Precision, TravRay},
     geom::{Hit, Ray, Triangles},
     glam::Vec3,
     simd::{Simd, SimdLevel, Task, dispatch},
@@ -44,11 +44,18 @@ pub(super) struct Queries<'a> {
     pub(super) accel: &'a AnyAccel,
     pub(super) prims: Triangles<'a>,
     pub(super) simd: SimdLevel,
+    pub(super) precision: Precision,
     pub(super) any_hit: bool,
     pub(super) packet: bool,
 }
 
 impl Queries<'_> {
+    /// The ray of a record; `None` when it can hit nothing.
+    #[inline(always)]
+    fn ray(&self, record: &[u8; RAY_BYTES]) -> Option<TravRay> {
+        TravRay::with_forms(&decode(record), self.precision.into())
+    }
+
     /// Casts all rays `repeat` times in the current pool: the hit records of the last time, and the seconds of each.
     pub(super) fn run(&self, rays: &[u8], repeat: u32) -> (Vec<u8>, Vec<f64>) {
         let mut records = vec![0; rays.len() / RAY_BYTES * HIT_BYTES];
@@ -122,7 +129,7 @@ impl Chunk<'_> {
     fn closest<S: Simd>(self) {
         let Queries { accel, prims, .. } = self.queries;
         for (record, out) in self.rays.iter().zip(self.out) {
-            let hit = TravRay::new(&decode(record)).and_then(|ray| {
+            let hit = self.queries.ray(record).and_then(|ray| {
                 let mut best = Closest::new(&ray);
                 accel.closest::<S, _, _>(prims, &ray, &mut best, &AnyHit, &mut ());
                 best.hit(&ray)
@@ -135,7 +142,7 @@ impl Chunk<'_> {
     fn occluded<S: Simd>(self) {
         let Queries { accel, prims, .. } = self.queries;
         for (record, out) in self.rays.iter().zip(self.out) {
-            let ray = TravRay::new(&decode(record));
+            let ray = self.queries.ray(record);
             *out = encode_blocked(ray.is_some_and(|ray| accel.occluded::<S, _, _>(prims, &ray, &AnyHit, &mut ())));
         }
     }
@@ -144,13 +151,15 @@ impl Chunk<'_> {
     #[inline(always)]
     fn packets<S: Simd>(self) {
         let Queries { accel, prims, any_hit, .. } = self.queries;
-        let Some(stand_in) = TravRay::new(&Ray::new(Vec3::ZERO, Vec3::X)) else { return };
+        let Some(stand_in) = TravRay::with_forms(&Ray::new(Vec3::ZERO, Vec3::X), self.queries.precision.into()) else {
+            return;
+        };
         let sinks = [AnyHit; PACKET];
         for (records, out) in self.rays.chunks(PACKET).zip(self.out.chunks_mut(PACKET)) {
             let mut rays = [stand_in; PACKET];
             let mut active = 0;
             for (i, record) in records.iter().enumerate() {
-                if let Some(ray) = TravRay::new(&decode(record)) {
+                if let Some(ray) = self.queries.ray(record) {
                     rays[i] = ray;
                     active |= 1 << i;
                 }

@@ -28,7 +28,8 @@ pub(crate) fn run(args: &RenderArgs, settings: &Settings) -> Result<(), CliError
     let plan = Plan::new(args, request, loaded, settings)?;
     let to_do = existing::remaining(&plan, settings)?;
     signals.check()?;
-    tracing::info!("{} frames to render, {} kept", to_do.len(), plan.frames.len() - to_do.len());
+    let kept = plan.frames.len() - to_do.len();
+    tracing::info!("{} frames to render, {kept} kept; precision {}", to_do.len(), settings.precision);
     if let Some(file) = to_do.first().and_then(|&f| plan.target.file(f)) {
         atomic::prepare(&file)?;
     }

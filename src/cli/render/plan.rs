@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use kinora::{
+    accel::Precision,
     dynamics::RebuildPolicy,
     output::{
         Chroma, ExrColor, FilmFormat, FilmSettings, Fps, FrameList, SettingsHash, SettingsHasher, Shard, Stamp, Target,
@@ -109,6 +110,7 @@ impl Plan {
             ("samples", args.samples.to_string()),
             ("seed", args.seed.to_string()),
             ("shading", shading.name().to_owned()),
+            ("precision", precision_key(settings)),
             ("format", format!("{:?}", format_options(&target, exr_color, chroma))),
         ] {
             hasher.add(name, value.as_bytes());
@@ -140,6 +142,14 @@ impl Plan {
             resume: args.resume,
             overwrite: args.overwrite,
         })
+    }
+}
+
+/// What the precision makes pictures depend on.
+fn precision_key(settings: &Settings) -> String {
+    match settings.precision {
+        Precision::Exact => "exact".to_owned(),
+        Precision::Fast => format!("fast {} {} {}", settings.accel, settings.top, settings.simd),
     }
 }
 

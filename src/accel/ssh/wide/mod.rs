@@ -75,6 +75,11 @@ impl<const K: usize> Tree for Wide<K> {
     type Node = Node<K>;
 
     #[inline(always)]
+    fn reach(&self) -> f32 {
+        self.reach
+    }
+
+    #[inline(always)]
     fn node(&self, number: usize) -> &Node<K> {
         &self.nodes[number]
     }
@@ -159,8 +164,7 @@ impl<const K: usize> Wide<K> {
         if self.config.refit == Sides::Keep {
             self.boxes = Vec::new();
         }
-        let reach = self.bounds.min.abs().max(self.bounds.max.abs()).max_element();
-        self.reach = if self.bounds.is_empty() { 0.0 } else { reach };
+        self.reach = self.bounds.reach();
     }
 
     /// Expected cost of a ray, in units of the triangles' own area.

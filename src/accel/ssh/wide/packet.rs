@@ -167,7 +167,7 @@ impl<const K: usize> Wide<K> {
         sinks: &[H],
         count: &mut C,
     ) {
-        let mut packet = PacketRays::new(rays);
+        let mut packet = PacketRays::new(rays, self.reach);
         for (i, best) in best.iter().enumerate() {
             packet.set_limit(i, best);
         }
@@ -207,7 +207,7 @@ impl<const K: usize> Wide<K> {
                 let (members, backward) = packet::group(|ray| self.is_ordinary(ray), rays, left);
                 left &= !members;
                 if members.count_ones() > FEW {
-                    let packet = PacketRays::new(rays);
+                    let packet = PacketRays::new(rays, self.reach);
                     let together = Packet::<S>::new(&packet, members, backward);
                     if let Some(root) = self.start(&together, &packet, members) {
                         let hits =
@@ -233,7 +233,7 @@ pub(super) fn met_together<S: Simd, const K: usize>(ray: &TravRay, node: &Node<K
     let rays = [*ray; 3];
     let range = ray.range();
     let packet =
-        Packet::<S>::new(&PacketRays::new(&rays), 7, [range.dir.x < 0.0, range.dir.y < 0.0, range.dir.z < 0.0]);
+        Packet::<S>::new(&PacketRays::new(&rays, 0.0), 7, [range.dir.x < 0.0, range.dir.y < 0.0, range.dir.z < 0.0]);
     let start = slabs::Segments { near: S::F::splat(range.t_near), far: S::F::splat(range.t_far) };
     let mut kids = Segments { near: [0.0; WIDTH], far: [0.0; WIDTH] };
     let segment = Segment { near: range.t_near, far: range.t_far };
