@@ -13,6 +13,10 @@
     reason = "small numbers; results are compared bit for bit"
 )]
 
+#[path = "../common/ccd.rs"]
+mod ccd;
+#[path = "../common/mod.rs"]
+mod common;
 #[path = "../common/scenes.rs"]
 #[allow(dead_code, unreachable_pub, reason = "shared with other test files")]
 mod scenes;
@@ -35,3 +39,4 @@ mod h08_closed_box;
 mod h09_flat;
 mod h10_range;
 mod h11_motion;
+mod h12_contact;
