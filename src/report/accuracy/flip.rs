@@ -224,15 +224,14 @@ mod tests {
     fn a_difference_counts_more_where_it_makes_an_edge() {
         let gray = flat([100; 3], 40);
         let mut line = gray.clone();
-        let mut spread = gray.clone();
         for row in 0..40 {
             line[(row * 40 + 20) * 4..][..3].fill(180);
         }
-        for p in spread.chunks_exact_mut(4) {
-            p[..3].fill(102);
-        }
-        assert!(mean(&gray, &line, 40, 40) > mean(&gray, &spread, 40, 40));
-        assert!((mean(&gray, &line, 40, 40) - mean(&line, &gray, 40, 40)).abs() < 1e-12);
+        let [a, b] = [&gray, &line].map(|p| Picture::new(p, [40, 40]));
+        let of_colors = color_difference(&a, &b).iter().sum::<f64>() / 1600.0;
+        let found = mean(&gray, &line, 40, 40);
+        assert!(found > 1.2 * of_colors && of_colors > 0.0, "{found} {of_colors}");
+        assert!((found - mean(&line, &gray, 40, 40)).abs() < 1e-12);
     }
 
     #[test]

@@ -7,6 +7,7 @@ mod bounds;
 mod flip;
 mod images;
 mod needs;
+mod offset;
 mod pareto;
 mod point;
 mod quest;
@@ -74,6 +75,7 @@ struct Rows {
     images: Vec<images::ImageRow>,
     same: Vec<same::SameRow>,
     needs: Vec<needs::NeedRow>,
+    offsets: Vec<offset::OffsetRow>,
 }
 
 impl Rows {
@@ -94,6 +96,7 @@ impl Rows {
         checks.extend(updates::checks(&self.updates));
         checks.extend(same::checks(&self.same));
         checks.extend(skin::checks(&self.skins));
+        checks.extend(offset::checks(&self.offsets));
         checks.extend(images::checks(&self.images));
         checks
     }
@@ -105,6 +108,7 @@ impl Rows {
             updates::table(&self.updates),
             skin::table(&self.skins),
             images::table(&self.images),
+            offset::table(&self.offsets),
             same::table(&self.same),
             needs::table(&self.needs),
             pareto::table(&self.rays),
@@ -133,6 +137,7 @@ pub fn report(sources: &[Source], options: &Options, monitor: &mut dyn Monitor) 
     for source in sources.iter().chain(&defaults) {
         rows.measure(source, options, monitor)?;
     }
+    rows.offsets = offset::measure(options, monitor)?;
     report.summary = summary::summary(&rows.rays);
     report.checks = rows.checks();
     report.tables = rows.tables();
