@@ -40,28 +40,33 @@ enum Against {
 /// A picture beside another.
 #[derive(Clone, Debug)]
 pub(super) struct ImageRow {
-    scene: String,
+    pub(super) scene: String,
     against: Against,
-    structure: String,
-    forms: Forms,
-    samples: u32,
+    pub(super) structure: String,
+    pub(super) forms: Forms,
+    pub(super) samples: u32,
     size: [u32; 2],
-    frame: Samples,
+    pub(super) frame: Samples,
     update: Samples,
     rays: u64,
-    difference: Difference,
+    pub(super) difference: Difference,
 }
 
 /// What is told of two pictures.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-struct Difference {
-    rmse: f64,
-    flip: f64,
+pub(super) struct Difference {
+    pub(super) rmse: f64,
+    pub(super) flip: f64,
     largest: f64,
-    pixels: u64,
+    pub(super) pixels: u64,
 }
 
 impl ImageRow {
+    /// True for a picture of few samples beside one of many.
+    pub(super) fn is_sampling(&self) -> bool {
+        self.against == Against::Converged
+    }
+
     fn cells(&self) -> Vec<Cell> {
         let d = &self.difference;
         let trace = self.frame.median().zip(self.update.median()).map(|(frame, update)| frame - update);

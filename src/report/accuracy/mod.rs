@@ -101,6 +101,11 @@ impl Rows {
         checks
     }
 
+    /// What has both a cost and an error.
+    fn spots(&self) -> Vec<pareto::Spot> {
+        pareto::spots(&self.rays, &self.images, &self.skins)
+    }
+
     fn tables(&self) -> Vec<Table> {
         let mut tables = vec![
             bounds::table(),
@@ -111,7 +116,7 @@ impl Rows {
             offset::table(&self.offsets),
             same::table(&self.same),
             needs::table(&self.needs),
-            pareto::table(&self.rays),
+            pareto::table(&self.spots()),
         ];
         tables.retain(|t| !t.rows.is_empty());
         tables
@@ -141,6 +146,6 @@ pub fn report(sources: &[Source], options: &Options, monitor: &mut dyn Monitor) 
     report.summary = summary::summary(&rows.rays);
     report.checks = rows.checks();
     report.tables = rows.tables();
-    report.plots = pareto::plots(&rows.rays);
+    report.plots = pareto::plots(&rows.spots());
     Ok(report)
 }

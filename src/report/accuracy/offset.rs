@@ -159,10 +159,8 @@ impl Room {
         let accel = "bvh2".parse::<AccelSpec>().map_err(crate::accel::BuildError::from)?.build(&prims)?;
         let batches = options.rays().div_ceil(BATCH) as u64;
         let rays: Vec<Ray> = (0..batches).flat_map(|b| mesh.rays(Aim::Anywhere, false, b)).collect();
-        let rays: Vec<Ray> = rays
-            .into_iter()
-            .map(|r| Ray::new(place(r.origin), (placed.matrix * r.dir.as_dvec3()).as_vec3()))
-            .collect();
+        let rays: Vec<Ray> =
+            rays.into_iter().map(|r| Ray::new(place(r.origin), (placed.matrix * r.dir.as_dvec3()).as_vec3())).collect();
         let caster = Caster { accel: &accel, prims, simd: options.simd, forms: Forms::EXACT };
         let found = caster.answers(&rays, Ask::Closest);
         let hits = rays.into_iter().zip(found).filter_map(|(ray, found)| Some((ray, found.found()?))).collect();

@@ -1,92 +1,117 @@
 //! Which points are worth their cost.
 
-use super::rays::RayRow;
+use super::{images::ImageRow, point::label, quest::Class, rays::RayRow, skin::SkinRow};
 use crate::{
     geom::Forms,
-    report::{Cell, Chart, Column, Dot, Plot, Role, Scatter, Table, reference::wilson},
+    report::{Cell, Chart, Column, Dot, Plot, Role, Scatter, Table, closed::Aim, reference::wilson},
 };
 
 const COLUMNS: &[Column] = &[
     Column::new("scene", "scene", Role::Id, 0),
-    Column::new("rays", "rays", Role::Id, 0),
+    Column::new("of", "of", Role::Id, 0),
     Column::new("cost", "cost", Role::Id, 0),
     Column::new("error", "error", Role::Id, 0),
-    Column::new("structure", "structure", Role::Id, 0),
-    Column::new("nodes", "node format", Role::Id, 0),
-    Column::new("precision", "precision", Role::Id, 0),
-    Column::new("cast", "cast", Role::Id, 0),
+    Column::new("point", "point", Role::Id, 0),
+    Column::new("nodes", "node format", Role::Note, 0),
+    Column::new("precision", "precision", Role::Note, 0),
     Column::new("cost_value", "cost, value", Role::Note, 1),
     Column::new("error_value", "error, value", Role::Note, 3),
     Column::new("non_dominated", "non-dominated", Role::Note, 0),
 ];
 
-/// What a point costs.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Cost {
-    NsPerRay,
-    BytesPerTriangle,
+/// A number with its name, and where it is drawn.
+#[derive(Clone, Debug, PartialEq)]
+struct Value {
+    name: &'static str,
+    value: f64,
+    /// A rate is drawn at the upper end of its confidence interval.
+    drawn: f64,
 }
 
-impl Cost {
-    const ALL: [Self; 2] = [Self::NsPerRay, Self::BytesPerTriangle];
-
-    fn name(self) -> &'static str {
-        match self {
-            Self::NsPerRay => "ns a ray",
-            Self::BytesPerTriangle => "bytes a triangle",
-        }
+impl Value {
+    fn new(name: &'static str, value: f64) -> Self {
+        Self { name, value, drawn: value }
     }
 
-    fn of(self, row: &RayRow) -> Option<f64> {
-        match self {
-            Self::NsPerRay => row.ns(),
-            Self::BytesPerTriangle => Some(row.bytes_per_triangle),
-        }
+    /// Of `events` in `trials`, in 10^9.
+    fn rate(name: &'static str, events: u64, trials: u64) -> Self {
+        let value = events as f64 * 1e9 / trials.max(1) as f64;
+        Self { name, value, drawn: wilson(events, trials).1 * 1e9 }
     }
 }
 
-/// What is wrong with a point's answers.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Measure {
-    Mistakes,
-    Leaks,
-    TMax,
-    UvMax,
+/// Something that costs and errs.
+#[derive(Clone, Debug)]
+pub(super) struct Spot {
+    scene: String,
+    /// What it may be compared within: a class of rays, pictures, vertices.
+    of: String,
+    point: String,
+    nodes: &'static str,
+    forms: Forms,
+    costs: Vec<Value>,
+    errors: Vec<Value>,
+    is_drawn: bool,
 }
 
-impl Measure {
-    const ALL: [Self; 4] = [Self::Mistakes, Self::Leaks, Self::TMax, Self::UvMax];
+/// All rows that have both a cost and an error.
+pub(super) fn spots(rays: &[RayRow], images: &[ImageRow], skins: &[SkinRow]) -> Vec<Spot> {
+    let rays = rays.iter().filter_map(of_rays);
+    rays.chain(images.iter().filter_map(of_image)).chain(skins.iter().filter_map(of_skin)).collect()
+}
 
-    fn name(self) -> &'static str {
-        match self {
-            Self::Mistakes => "wrong answers in 10^9",
-            Self::Leaks => "leaks in 10^9",
-            Self::TMax => "largest error of t [u]",
-            Self::UvMax => "largest error of u, v [u]",
-        }
-    }
+fn of_rays(row: &RayRow) -> Option<Spot> {
+    let e = &row.errors;
+    let mut errors = vec![Value::rate("wrong answers in 10^9", e.mistakes(), e.rays)];
+    errors.extend(e.leaks.map(|n| Value::rate("leaks in 10^9", n, e.rays)));
+    errors.extend(e.t[2].map(|t| Value::new("largest error of t [u]", t)));
+    errors.extend(e.t[2].map(|_| Value::new("largest error of u, v [u]", e.uv_max)));
+    Some(Spot {
+        scene: row.scene.clone(),
+        of: row.class.name(),
+        point: format!("{} {}, {}", row.structure, label(row.forms), row.cast()),
+        nodes: row.nodes,
+        forms: row.forms,
+        costs: vec![Value::new("ns a ray", row.ns()?), Value::new("bytes a triangle", row.bytes_per_triangle)],
+        errors,
+        is_drawn: matches!(row.class, Class::Edges | Class::Inside(Aim::Edges)),
+    })
+}
 
-    /// The rate of an event is as it was found; what it may be at most is drawn.
-    fn of(self, row: &RayRow) -> Option<f64> {
-        let e = &row.errors;
-        let rate = |n: u64| n as f64 * 1e9 / e.rays.max(1) as f64;
-        match self {
-            Self::Mistakes => Some(rate(e.mistakes())),
-            Self::Leaks => e.leaks.map(rate),
-            Self::TMax => e.t[2],
-            Self::UvMax => e.t[2].map(|_| e.uv_max),
-        }
-    }
+fn of_image(row: &ImageRow) -> Option<Spot> {
+    let (of, samples) = if row.is_sampling() {
+        ("sampling", format!(", {} samples", row.samples))
+    } else {
+        ("pictures", String::new())
+    };
+    let d = &row.difference;
+    Some(Spot {
+        scene: row.scene.clone(),
+        of: of.to_owned(),
+        point: format!("{} {}{samples}", row.structure, label(row.forms)),
+        nodes: "",
+        forms: row.forms,
+        costs: vec![Value::new("ms a frame", row.frame.median()? * 1e3)],
+        errors: vec![
+            Value::new("RMSE", d.rmse),
+            Value::new("mean FLIP", d.flip),
+            Value::new("differing pixels", d.pixels as f64),
+        ],
+        is_drawn: true,
+    })
+}
 
-    /// Where the point is drawn: a rate at the upper end of its confidence interval.
-    fn drawn(self, row: &RayRow) -> Option<f64> {
-        let high = |n: u64| wilson(n, row.errors.rays).1 * 1e9;
-        match self {
-            Self::Mistakes => Some(high(row.errors.mistakes())),
-            Self::Leaks => row.errors.leaks.map(high),
-            Self::TMax | Self::UvMax => self.of(row),
-        }
-    }
+fn of_skin(row: &SkinRow) -> Option<Spot> {
+    Some(Spot {
+        scene: row.scene.clone(),
+        of: "vertices".to_owned(),
+        point: label(row.forms),
+        nodes: "",
+        forms: row.forms,
+        costs: vec![Value::new("ms a frame of deforming", row.deform.median()? * 1e3)],
+        errors: vec![Value::new("largest error over size", row.max), Value::new("RMS error over size", row.rms)],
+        is_drawn: false,
+    })
 }
 
 /// For each point (cost, error): true when no other is at least as good in both and better in one.
@@ -95,101 +120,99 @@ fn non_dominated(points: &[(f64, f64)]) -> Vec<bool> {
     points.iter().map(|p| !points.iter().any(|q| beats(q, p))).collect()
 }
 
-/// A group of points that may be compared: one scene, one class, one cost and one measure.
+/// Spots that may be compared, by one cost and one error.
 struct Front<'a> {
-    cost: Cost,
-    measure: Measure,
-    rows: Vec<&'a RayRow>,
-    points: Vec<(f64, f64)>,
+    spots: Vec<&'a Spot>,
+    costs: Vec<&'a Value>,
+    errors: Vec<&'a Value>,
     best: Vec<bool>,
 }
 
-fn fronts(rows: &[RayRow]) -> Vec<Front<'_>> {
-    let mut groups: Vec<(String, String)> = Vec::new();
-    for row in rows {
-        let group = (row.scene.clone(), row.class.name());
-        if !groups.contains(&group) {
-            groups.push(group);
-        }
-    }
-    let mut fronts = Vec::new();
-    for (scene, class) in &groups {
-        let of_group: Vec<&RayRow> = rows.iter().filter(|r| r.scene == *scene && r.class.name() == *class).collect();
-        for (cost, measure) in Cost::ALL.into_iter().flat_map(|c| Measure::ALL.map(|m| (c, m))) {
-            let with = of_group.iter().filter_map(|&r| Some((r, (cost.of(r)?, measure.of(r)?))));
-            let (rows, points): (Vec<&RayRow>, Vec<(f64, f64)>) = with.unzip();
-            if !rows.is_empty() {
-                let best = non_dominated(&points);
-                fronts.push(Front { cost, measure, rows, points, best });
+fn fronts(spots: &[Spot]) -> Vec<Front<'_>> {
+    let mut keys: Vec<(&str, &str, &str, &str)> = Vec::new();
+    for s in spots {
+        for (cost, error) in s.costs.iter().flat_map(|c| s.errors.iter().map(move |e| (c.name, e.name))) {
+            let key = (s.scene.as_str(), s.of.as_str(), cost, error);
+            if !keys.contains(&key) {
+                keys.push(key);
             }
         }
     }
-    fronts
+    keys.into_iter().map(|key| Front::new(spots, key)).collect()
+}
+
+impl<'a> Front<'a> {
+    fn new(spots: &'a [Spot], (scene, of, cost, error): (&str, &str, &str, &str)) -> Self {
+        let mut front = Self { spots: Vec::new(), costs: Vec::new(), errors: Vec::new(), best: Vec::new() };
+        for s in spots.iter().filter(|s| s.scene == scene && s.of == of) {
+            let named = |values: &'a [Value], name: &str| values.iter().find(|v| v.name == name);
+            if let (Some(cost), Some(error)) = (named(&s.costs, cost), named(&s.errors, error)) {
+                front.spots.push(s);
+                front.costs.push(cost);
+                front.errors.push(error);
+            }
+        }
+        let points = front.costs.iter().zip(&front.errors).map(|(c, e)| (c.value, e.value));
+        front.best = non_dominated(&points.collect::<Vec<_>>());
+        front
+    }
+
+    /// Where every point errs alike there is nothing to see.
+    fn is_telling(&self) -> bool {
+        let first = self.errors[0].value;
+        self.errors.iter().any(|e| e.value.total_cmp(&first).is_ne())
+    }
+
+    fn plot(&self) -> Plot {
+        let dots = (0..self.spots.len()).map(|i| Dot {
+            name: self.spots[i].point.clone(),
+            at: (self.costs[i].value, self.errors[i].drawn),
+            is_best: self.best[i],
+            mark: usize::from(self.spots[i].forms != Forms::EXACT),
+        });
+        let (cost, error, spot) = (self.costs[0].name, self.errors[0].name, self.spots[0]);
+        let is_rate = error.ends_with("10^9");
+        let y = if is_rate { format!("{error}, at most (95 %)") } else { error.to_owned() };
+        Plot::new(
+            short(&format!("pareto {} {} {cost} {error}", spot.scene, spot.of)),
+            format!("{}, {}", spot.scene, spot.of),
+            Chart::Scatter(Scatter { x: cost.to_owned(), y, dots: dots.collect() }),
+        )
+    }
 }
 
 /// All points with their marks.
-pub(super) fn table(rows: &[RayRow]) -> Table {
+pub(super) fn table(spots: &[Spot]) -> Table {
     let mut table = Table::new("pareto", "Which points are worth their cost", COLUMNS).with_note(
-        "A point is non-dominated when no other point on the same rays costs at most as much and errs at most as much, and is better in one of both. \
+        "A point is non-dominated when no other point of the same scene and kind costs at most as much and errs at most as much, and is better in one of both. \
          There is no single score: a point that is dominated here may be the best by another cost or error.",
     );
-    for front in fronts(rows) {
-        for ((row, point), &best) in front.rows.iter().zip(&front.points).zip(&front.best) {
+    for front in fronts(spots) {
+        for (i, spot) in front.spots.iter().enumerate() {
             table.push(vec![
-                row.scene.clone().into(),
-                row.class.name().into(),
-                front.cost.name().into(),
-                front.measure.name().into(),
-                row.structure.clone().into(),
-                row.nodes.into(),
-                super::point::label(row.forms).into(),
-                row.cast().into(),
-                point.0.into(),
-                point.1.into(),
-                Cell::Flag(best),
+                spot.scene.clone().into(),
+                spot.of.clone().into(),
+                front.costs[i].name.into(),
+                front.errors[i].name.into(),
+                spot.point.clone().into(),
+                if spot.nodes.is_empty() { Cell::Absent } else { spot.nodes.into() },
+                label(spot.forms).into(),
+                front.costs[i].value.into(),
+                front.errors[i].value.into(),
+                Cell::Flag(front.best[i]),
             ]);
         }
     }
     table
 }
 
-/// A plot of each scene, class of rays aimed at edges or from inside, cost and measure.
-pub(super) fn plots(rows: &[RayRow]) -> Vec<Plot> {
-    fronts(rows).iter().filter(|f| f.points.len() > 2 && f.is_telling()).map(Front::plot).collect()
+/// Plots of rays at edges and of pictures, by every cost and every error that tells points apart.
+pub(super) fn plots(spots: &[Spot]) -> Vec<Plot> {
+    let drawn: Vec<Spot> = spots.iter().filter(|s| s.is_drawn).cloned().collect();
+    fronts(&drawn).iter().filter(|f| f.spots.len() > 2 && f.is_telling()).map(Front::plot).collect()
 }
 
-impl Front<'_> {
-    /// Where every point errs alike there is nothing to see.
-    fn is_telling(&self) -> bool {
-        let first = self.points[0].1;
-        self.points.iter().any(|p| p.1.total_cmp(&first).is_ne())
-    }
-
-    fn plot(&self) -> Plot {
-        let dot = |((row, point), &best): ((&&RayRow, &(f64, f64)), &bool)| {
-            let single = if row.packets { ", packets" } else { "" };
-            Dot {
-                name: format!("{} {}{single}", row.structure, super::point::label(row.forms)),
-                at: (point.0, self.measure.drawn(row).unwrap_or(point.1)),
-                is_best: best,
-                mark: usize::from(row.forms != Forms::EXACT),
-            }
-        };
-        let dots = self.rows.iter().zip(&self.points).zip(&self.best).map(dot).collect();
-        let y = match self.measure {
-            Measure::Mistakes | Measure::Leaks => format!("{}, at most (95 %)", self.measure.name()),
-            Measure::TMax | Measure::UvMax => self.measure.name().to_owned(),
-        };
-        let (scene, class) = (&self.rows[0].scene, self.rows[0].class.name());
-        Plot::new(
-            format!("pareto {scene} {class} {} {}", short(self.cost.name()), short(self.measure.name())),
-            format!("{scene}, {class}"),
-            Chart::Scatter(Scatter { x: self.cost.name().to_owned(), y, dots }),
-        )
-    }
-}
-
-/// Letters and digits only, for file names.
+/// Letters and digits, with dashes between words.
 fn short(name: &str) -> String {
     let words = name.split(|c: char| !c.is_ascii_alphanumeric()).filter(|w| !w.is_empty());
     words.collect::<Vec<_>>().join("-")
@@ -204,6 +227,30 @@ mod tests {
         let points = [(1.0, 5.0), (2.0, 3.0), (2.0, 4.0), (3.0, 3.0), (4.0, 0.0), (4.0, 0.0)];
         assert_eq!(non_dominated(&points), [true, true, false, false, true, true]);
         assert_eq!(non_dominated(&[(f64::NAN, 0.0), (1.0, 0.0)]), [true, true]);
+    }
+
+    #[test]
+    fn points_are_compared_within_their_scene_kind_cost_and_error_only() {
+        let spot = |scene: &str, of: &str, cost: f64, error: f64| Spot {
+            scene: scene.to_owned(),
+            of: of.to_owned(),
+            point: format!("{cost}"),
+            nodes: "slabs",
+            forms: Forms::EXACT,
+            costs: vec![Value::new("ns", cost)],
+            errors: vec![Value::new("u", error)],
+            is_drawn: true,
+        };
+        let spots = [
+            spot("a", "rays", 1.0, 1.0),
+            spot("a", "rays", 2.0, 2.0),
+            spot("b", "rays", 2.0, 2.0),
+            spot("a", "x", 9.0, 9.0),
+        ];
+        let table = table(&spots);
+        let marks: Vec<&Cell> = table.column("non_dominated").collect();
+        assert_eq!(marks, [&Cell::Flag(true), &Cell::Flag(false), &Cell::Flag(true), &Cell::Flag(true)]);
+        assert!(plots(&spots).is_empty());
     }
 
     #[test]

@@ -32,13 +32,13 @@ const ROUNDS: f64 = 10_000.0;
 /// A scene's vertices in one precision.
 #[derive(Clone, Debug, Default)]
 pub(super) struct SkinRow {
-    scene: String,
-    fast: bool,
+    pub(super) scene: String,
+    pub(super) forms: Forms,
     vertices: usize,
     frames: usize,
-    deform: Samples,
-    max: f64,
-    rms: f64,
+    pub(super) deform: Samples,
+    pub(super) max: f64,
+    pub(super) rms: f64,
     rounding: f64,
     drift: f64,
     not_returned: u64,
@@ -54,7 +54,7 @@ pub(super) fn table(rows: &[SkinRow]) -> Table {
     for r in rows {
         table.push(vec![
             r.scene.clone().into(),
-            if r.fast { "fast" } else { "exact" }.into(),
+            r.forms.deform.name().into(),
             r.vertices.into(),
             r.frames.into(),
             r.deform.median().map(|s| s * 1e3).into(),
@@ -73,7 +73,7 @@ const FAST_ERROR: f64 = 1e-5;
 
 /// What vertices must show.
 pub(super) fn checks(rows: &[SkinRow]) -> Vec<Check> {
-    let of = |fast: bool| rows.iter().filter(move |r| r.fast == fast);
+    let of = |fast: bool| rows.iter().filter(move |r| (r.forms.deform == Precision::Fast) == fast);
     let over = of(false).map(|r| r.max / r.rounding).reduce(f64::max);
     vec![
         Check::new("exact vertices: error over half a step of f32", Bound::AtMost(1.0), over),
@@ -105,10 +105,9 @@ pub(super) fn measure(
     monitor.begin(&format!("{}: skinning", source.name))?;
     let mut rows = Vec::new();
     for deform in Precision::ALL {
-        let mut row = Stage::new(scene, clip, Forms { deform, ..Forms::EXACT })?.row(options)?;
-        row.scene.clone_from(&source.name);
-        row.fast = deform == Precision::Fast;
-        rows.push(row);
+        let forms = Forms { deform, ..Forms::EXACT };
+        let row = Stage::new(scene, clip, forms)?.row(options)?;
+        rows.push(SkinRow { scene: source.name.clone(), forms, ..row });
     }
     Ok(rows)
 }
