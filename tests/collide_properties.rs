@@ -253,9 +253,10 @@ proptest! {
         prop_assert_eq!(passage.is_some(), due, "{:?} {:?} {:?}", ray, aabb, passage);
         if let Some(passage) = passage {
             prop_assert!(near(passage.enter, &moments.low), "{:?} for {}", passage, moments.low);
-            match &moments.high {
-                Some(high) => prop_assert!(near(passage.exit, high) && passage.exit >= passage.enter),
-                None => prop_assert_eq!(passage.exit, f64::INFINITY),
+            if let Some(high) = &moments.high {
+                prop_assert!(near(passage.exit, high) && passage.exit >= passage.enter);
+            } else {
+                prop_assert_eq!(passage.exit, f64::INFINITY);
             }
         }
     }

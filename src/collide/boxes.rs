@@ -127,15 +127,14 @@ impl Span {
 
     /// Keeps the moments s with `lower[0] - lower[1] <= s * speed <= upper[0] - upper[1]`; `None` when a constant rules all out.
     fn narrow(&mut self, lower: [f32; 2], upper: [f32; 2], speed: f32) -> Option<()> {
-        // Differences with an infinite end: no bound, or none that can be kept.
-        let (low, high) = (end(lower)?, end([-upper[0], -upper[1]])?);
-        if speed == 0.0 {
-            let fits = low.is_none_or(|[to, from]| to <= from) && high.is_none_or(|[to, from]| to <= from);
-            return fits.then_some(());
+        if is_out_of_reach(lower) || is_out_of_reach(upper.map(|x| -x)) {
+            return None;
         }
-        // The upper bound's ends were negated: turn them back.
-        let low = low.map(|[to, from]| Ratio { to, from, speed });
-        let high = high.map(|[to, from]| Ratio { to: -to, from: -from, speed });
+        if speed == 0.0 {
+            return (lower[0] <= lower[1] && upper[0] >= upper[1]).then_some(());
+        }
+        let bound = |[to, from]: [f32; 2]| (to.is_finite() && from.is_finite()).then_some(Ratio { to, from, speed });
+        let (low, high) = (bound(lower), bound(upper));
         let (enter, exit) = if speed > 0.0 { (low, high) } else { (high, low) };
         if let Some(enter) = enter {
             self.enter = later(self.enter, enter);
@@ -158,15 +157,10 @@ impl Span {
     }
 }
 
-/// The lower bound `to - from`: `Some(None)` where there is no bound, `None` where nothing can reach it.
-fn end([to, from]: [f32; 2]) -> Option<Option<[f32; 2]>> {
-    if to == f32::NEG_INFINITY || from == f32::INFINITY {
-        Some(None)
-    } else if to == f32::INFINITY || from == f32::NEG_INFINITY {
-        None
-    } else {
-        Some(Some([to, from]))
-    }
+/// Whether `to - from` is a lower bound that nothing finite reaches; an infinite one the other way bounds nothing.
+fn is_out_of_reach([to, from]: [f32; 2]) -> bool {
+    let unbounded = to == f32::NEG_INFINITY || from == f32::INFINITY;
+    !unbounded && (to == f32::INFINITY || from == f32::NEG_INFINITY)
 }
 
 fn later(a: Moment, b: Ratio) -> Moment {

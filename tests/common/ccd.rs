@@ -51,7 +51,7 @@ fn read(file: &Path, is_face: bool, truth: Option<&[bool]>, out: &mut Vec<Query>
             (DVec3::new(x, y, z), fields.get(6).map(|f| f.trim() == "1"))
         })
         .collect();
-    assert!(!rows.is_empty() && rows.len() % 8 == 0, "{}: {} rows", file.display(), rows.len());
+    assert!(!rows.is_empty() && rows.len().is_multiple_of(8), "{}: {} rows", file.display(), rows.len());
     for (i, rows) in rows.chunks_exact(8).enumerate() {
         let corner = |k: usize| rows[k].0;
         out.push(Query {

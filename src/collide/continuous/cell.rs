@@ -148,8 +148,7 @@ impl Values {
     /// Mean derivatives by t, u and v, times the cell's extent.
     fn slopes(&self) -> [DVec3; 3] {
         let mut out = [DVec3::ZERO; 3];
-        for axis in 0..3 {
-            let f = &self.0[axis];
+        for (axis, f) in self.0.iter().enumerate() {
             out[0][axis] = ((f[4] - f[0]) + (f[5] - f[1])) + ((f[6] - f[2]) + (f[7] - f[3]));
             out[1][axis] = ((f[2] - f[0]) + (f[3] - f[1])) + ((f[6] - f[4]) + (f[7] - f[5]));
             out[2][axis] = ((f[1] - f[0]) + (f[3] - f[2])) + ((f[5] - f[4]) + (f[7] - f[6]));

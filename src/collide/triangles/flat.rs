@@ -48,7 +48,7 @@ fn faithful(a: &Shape, b: &Shape) -> Option<Projection> {
     }
     // On one line: keep an axis along which it runs.
     let first = *points.first()?;
-    let spread = |axis: usize| points.iter().any(|p| p[axis] != first[axis]);
+    let spread = |axis: usize| points.iter().any(|p| p.cmpne(first).test(axis));
     Some(Projection::ALL.into_iter().find(|p| spread(p.x)).unwrap_or(Projection::ALL[0]))
 }
 

@@ -45,7 +45,7 @@ pub(crate) fn answers(accel: &AnyAccel, mesh: &Mesh, rays: &[Ray], due: &[Option
 pub(crate) fn check(data: &[u8]) {
     let mut bytes = Bytes::new(data);
     let mesh = bytes.mesh(24, 24);
-    let rays: Vec<_> = (0..1 + bytes.below(12)).map(|_| bytes.ray(&mesh)).collect();
+    let rays: Vec<_> = (0..=bytes.below(12)).map(|_| bytes.ray(&mesh)).collect();
     let list = build(AccelKind::List, &mesh);
     let due = closest(&list, &mesh.prims(), &rays, SimdLevel::Scalar);
     for (ray, hit) in rays.iter().zip(&due).take(BY_INTEGERS) {

@@ -26,7 +26,7 @@ fn moved(mesh: &Mesh, first: &Mesh, bytes: &mut Bytes<'_>) -> Mesh {
             next.positions.iter_mut().for_each(|p| *p += shift);
         }
         _ => {
-            for _ in 0..1 + bytes.below(8) {
+            for _ in 0..=bytes.below(8) {
                 let vertex = bytes.below(next.positions.len());
                 next.positions[vertex] = bytes.vec3();
             }
@@ -47,12 +47,12 @@ pub(crate) fn check(data: &[u8]) {
         .map(|a| [a.clone(), a])
         .collect();
     let mut mesh = first.clone();
-    for _ in 0..1 + bytes.below(5) {
+    for _ in 0..=bytes.below(5) {
         if bytes.is_empty() {
             break;
         }
         mesh = moved(&mesh, &first, &mut bytes);
-        let rays: Vec<Ray> = (0..1 + bytes.below(4)).map(|_| bytes.ray(&mesh)).collect();
+        let rays: Vec<Ray> = (0..=bytes.below(4)).map(|_| bytes.ray(&mesh)).collect();
         let fresh = build(AccelKind::List, &mesh);
         let due = closest(&fresh, &mesh.prims(), &rays, SimdLevel::Scalar);
         for [from, to] in &mut accels {
