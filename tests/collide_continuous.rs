@@ -14,7 +14,7 @@ use kinora::{collide::Continuous, glam::DVec3};
 use trace::Random;
 
 /// The published method reports 222 of 6,844 such queries for nothing.
-const FALSE_POSITIVES: f64 = 0.03;
+const FALSE_POSITIVES: f64 = 0.002;
 
 #[test]
 fn the_shared_queries_have_no_false_negative_and_few_false_positives() {

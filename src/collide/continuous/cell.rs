@@ -40,6 +40,11 @@ impl Cell {
         self.t[0]
     }
 
+    /// Of t, u and v.
+    pub(super) fn ranges(&self) -> [[f64; 2]; 3] {
+        [self.t, self.u, self.v]
+    }
+
     pub(super) fn is_spent(&self) -> bool {
         self.spent
     }

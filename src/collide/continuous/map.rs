@@ -84,6 +84,10 @@ impl Map {
         length * self.scale * (1.0 + 4.0 * f64::EPSILON)
     }
 
+    pub(super) fn scale(&self) -> f64 {
+        self.scale
+    }
+
     pub(super) fn is_face(&self) -> bool {
         self.is_face
     }
