@@ -75,13 +75,21 @@ fn rays(count: usize, seed: u64) -> Vec<Ray> {
     (0..count / PACKET).flat_map(bundle).collect()
 }
 
+/// Every structure over a mesh.
+fn all(mesh: &Mesh) -> Vec<AnyAccel> {
+    AccelKind::ALL.iter().map(|&kind| build(kind, mesh)).collect()
+}
+
 /// Every way to ask: forms, structure, packet, level.
-fn ways(forms: &[Forms]) -> impl Iterator<Item = (Forms, AccelKind, usize, SimdLevel)> + '_ {
-    forms.iter().flat_map(|&forms| {
-        AccelKind::ALL.iter().flat_map(move |&kind| {
+fn ways<'a>(
+    forms: &'a [Forms],
+    accels: &'a [AnyAccel],
+) -> impl Iterator<Item = (Forms, &'a AnyAccel, usize, SimdLevel)> + 'a {
+    forms.iter().flat_map(move |&forms| {
+        accels.iter().flat_map(move |accel| {
             [1, PACKET]
                 .into_iter()
-                .flat_map(move |packet| SimdLevel::available().map(move |level| (forms, kind, packet, level)))
+                .flat_map(move |packet| SimdLevel::available().map(move |level| (forms, accel, packet, level)))
         })
     })
 }
@@ -109,26 +117,26 @@ fn is_excusable(mesh: &Mesh, exact: Option<Hit>, fast: Option<Hit>) -> bool {
 
 #[test]
 fn fast_hits_agree_with_exact_ones_where_triangles_are_well_shaped() {
-    let mesh = soup(600, 0.3, 11);
-    let rays = rays(800, 12);
+    let mesh = soup(150, 0.5, 11);
+    let rays = rays(400, 12);
     let due = hits(&build(AccelKind::List, &mesh), &mesh, &rays, 1, SimdLevel::best(), Forms::EXACT);
-    for (forms, kind, packet, level) in ways(&MIXED) {
-        let found = hits(&build(kind, &mesh), &mesh, &rays, packet, level, forms);
+    for (forms, accel, packet, level) in ways(&MIXED, &all(&mesh)) {
+        let (kind, found) = (accel.kind(), hits(accel, &mesh, &rays, packet, level, forms));
         let wrong: Vec<_> =
             (0..rays.len()).filter(|&i| !is_excusable(&mesh, due[i], found[i])).map(|i| (due[i], found[i])).collect();
         assert!(wrong.len() <= 2, "{forms:?} {kind} {packet} {level}: {wrong:?}");
         let same = (0..rays.len()).filter(|&i| due[i].map(|h| h.prim) == found[i].map(|h| h.prim)).count();
-        assert!(same * 1000 >= rays.len() * 998, "{forms:?} {kind} {packet} {level}: {same} of {}", rays.len());
+        assert!(same * 1000 >= rays.len() * 995, "{forms:?} {kind} {packet} {level}: {same} of {}", rays.len());
     }
-    assert!(due.iter().flatten().count() > 250);
+    assert!(due.iter().flatten().count() > 100);
 }
 
 #[test]
 fn a_form_that_a_structure_does_not_have_stays_exact() {
-    let mesh = soup(300, 0.4, 3);
-    let rays = rays(800, 4);
+    let mesh = soup(150, 0.4, 3);
+    let rays = rays(320, 4);
     let nodes = Forms { nodes: Precision::Fast, ..Forms::EXACT };
-    for kind in [AccelKind::List, AccelKind::Grid, AccelKind::Kdtree, AccelKind::Grug, AccelKind::Events] {
+    for &kind in AccelKind::ALL.iter().filter(|&&k| k != AccelKind::Bvh2) {
         let accel = build(kind, &mesh);
         for packet in [1, PACKET] {
             let found = hits(&accel, &mesh, &rays, packet, SimdLevel::best(), nodes);
@@ -193,9 +201,9 @@ fn equal_t_goes_to_the_lower_triangle() {
     let mesh = soup(40, 1.0, 8);
     let once: Vec<_> = (0..mesh.indices.len()).map(|i| mesh.corners(i)).collect();
     let many = Mesh::soup(&once.iter().cycle().take(once.len() * 8).copied().collect::<Vec<_>>());
-    let rays = rays(480, 9);
-    for (forms, kind, packet, level) in ways(&[FAST]) {
-        let found = hits(&build(kind, &many), &many, &rays, packet, level, forms);
+    let rays = rays(240, 9);
+    for (forms, accel, packet, level) in ways(&[FAST], &all(&many)) {
+        let (kind, found) = (accel.kind(), hits(accel, &many, &rays, packet, level, forms));
         assert!(found.iter().flatten().all(|h| (h.prim.0 as usize) < once.len()), "{kind} {packet} {level}");
         assert!(found.iter().flatten().count() > 50);
     }
@@ -203,12 +211,12 @@ fn equal_t_goes_to_the_lower_triangle() {
 
 #[test]
 fn occlusion_agrees_with_the_closest_hit() {
-    let mesh = soup(500, 0.2, 21);
-    let rays = rays(800, 22);
-    for (forms, kind, packet, level) in ways(&MIXED) {
-        let accel = build(kind, &mesh);
-        let found = hits(&accel, &mesh, &rays, packet, level, forms);
-        let any = blocked(&accel, &mesh, &rays, packet, level, forms);
+    let mesh = soup(150, 0.4, 21);
+    let rays = rays(320, 22);
+    for (forms, accel, packet, level) in ways(&MIXED, &all(&mesh)) {
+        let kind = accel.kind();
+        let found = hits(accel, &mesh, &rays, packet, level, forms);
+        let any = blocked(accel, &mesh, &rays, packet, level, forms);
         let differing = (0..rays.len()).filter(|&i| found[i].is_some() != any[i]).count();
         // Packets thin out as rays are blocked, and few rays are tested one by one.
         assert!(differing <= 1, "{forms:?} {kind} {packet} {level}: {differing}");
@@ -217,8 +225,8 @@ fn occlusion_agrees_with_the_closest_hit() {
 
 #[test]
 fn levels_with_fused_products_give_the_same_fast_bits() {
-    let mesh = soup(500, 0.2, 31);
-    let rays = rays(800, 32);
+    let mesh = soup(200, 0.4, 31);
+    let rays = rays(320, 32);
     let fused: Vec<_> = SimdLevel::available().filter(|&l| l != SimdLevel::Scalar).collect();
     for &kind in AccelKind::ALL {
         let accel = build(kind, &mesh);
@@ -245,7 +253,7 @@ fn hostile3() -> impl Strategy<Value = Vec3> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 24, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 12, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
     fn hostile_numbers_give_hits_that_are_numbers(
@@ -254,9 +262,7 @@ proptest! {
     ) {
         let mesh = Mesh::soup(&corners);
         let rays: Vec<_> = lines.into_iter().map(|(origin, dir, t_near, t_far)| Ray { origin, dir, t_near, t_far }).collect();
-        let accels: Vec<_> = AccelKind::ALL.iter().map(|&kind| build(kind, &mesh)).collect();
-        for (forms, kind, packet, level) in ways(&MIXED) {
-            let accel = accels.iter().find(|a| a.kind() == kind).expect("all are built");
+        for (forms, accel, packet, level) in ways(&MIXED, &all(&mesh)) {
             for (hit, ray) in hits(accel, &mesh, &rays, packet, level, forms).iter().zip(&rays) {
                 let Some(hit) = hit else { continue };
                 prop_assert!(ray.origin.is_finite() && ray.dir.is_finite(), "{ray:?}");

@@ -180,7 +180,7 @@ impl TriBlock {
         if evaluated.mask == 0 {
             return;
         }
-        let spilled = Spilled::new(&evaluated);
+        let spilled = Spilled::<4>::new(&evaluated);
         let mut mask = evaluated.mask;
         while mask != 0 {
             let lane = (mask.trailing_zeros() & 3) as usize;
@@ -219,7 +219,7 @@ impl TriBlock {
         if evaluated.mask == 0 {
             return false;
         }
-        let spilled = Spilled::new(&evaluated);
+        let spilled = Spilled::<4>::new(&evaluated);
         let mut mask = evaluated.mask;
         while mask != 0 {
             let lane = (mask.trailing_zeros() & 3) as usize;
@@ -375,14 +375,14 @@ impl<L: Lanes<Elem = f64>> Evaluated<L> {
     }
 }
 
-/// The rows in memory, for access by lane.
-pub(super) struct Spilled([[f64; 8]; 7]);
+/// The rows in memory, for access by lane; N is at least the number of lanes.
+pub(super) struct Spilled<const N: usize>([[f64; N]; 7]);
 
-impl Spilled {
+impl<const N: usize> Spilled<N> {
     #[inline(always)]
     pub(super) fn new<L: Lanes<Elem = f64>>(evaluated: &Evaluated<L>) -> Self {
         // Filled in place: rows of this size made elsewhere would be copied.
-        let mut out = Self([[0.0; 8]; 7]);
+        let mut out = Self([[0.0; N]; 7]);
         let [a, b, c, d, e, f, g] = evaluated.rows;
         a.store(&mut out.0[0]);
         b.store(&mut out.0[1]);

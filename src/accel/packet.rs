@@ -94,7 +94,6 @@ impl PacketRays {
         };
         let mut differing = 0;
         let first = rays[0].range().origin;
-        let (mut low, mut high) = (first, first);
         for i in 0..PACKET {
             let range = rays[i.min(rays.len() - 1)].range();
             for axis in 0..3 {
@@ -105,14 +104,19 @@ impl PacketRays {
             let scale = range.dir.abs().max_element();
             out.scale[i] = scale;
             out.longest = if scale > out.longest { scale } else { out.longest };
-            (low, high) = (range.origin.min(low), range.origin.max(high));
             out.t_near32[i] = range.t_near;
             out.t_cull[i] = range.t_far;
             out.t_far[i] = range.t_far;
             out.t_limit[i] = f64::from(range.t_far);
         }
         out.common_origin = differing == 0;
-        out.spread = (high - low).element_sum();
+        let (mut low, mut high) = (first, first);
+        if !out.common_origin {
+            for ray in rays {
+                (low, high) = (ray.range().origin.min(low), ray.range().origin.max(high));
+            }
+            out.spread = (high - low).element_sum();
+        }
         let far = low.abs().max(high.abs()).max_element().max(reach).max(out.longest);
         out.moderate = far <= MODERATE;
         out
@@ -396,7 +400,7 @@ impl TriBlock {
                 if evaluated.mask == 0 {
                     continue;
                 }
-                let spilled = Spilled::new(&evaluated);
+                let spilled = Spilled::<8>::new(&evaluated);
                 for bit in bits(evaluated.mask) {
                     let i = first + bit;
                     if (evaluated.sure >> bit) & 1 == 1 {
@@ -469,7 +473,7 @@ impl TriBlock {
                 if hits == 0 {
                     continue;
                 }
-                let spilled = Spilled::new(&evaluated);
+                let spilled = Spilled::<8>::new(&evaluated);
                 for bit in bits(hits) {
                     let i = first + bit;
                     let hit = if (evaluated.sure >> bit) & 1 == 1 {

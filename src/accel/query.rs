@@ -4,7 +4,7 @@ use std::cmp::Ordering;
 
 use glam::{Vec3, Vec3A};
 
-use super::fast;
+use super::{fast, slabs};
 use crate::geom::{
     Forms, Hit, InstanceId, Precision, PrimId, Ray, Triangles,
     exact::{Quotients, RayRange, TriangleHit},
@@ -65,6 +65,10 @@ pub(super) const SLACK: f32 = f32::MIN_POSITIVE;
 pub struct TravRay {
     range: RayRange,
     ordinary: bool,
+    /// `|origin|∞`.
+    far: f32,
+    /// See [`TravRay::is_steady`].
+    steady: bool,
     forms: Forms,
 }
 
@@ -73,6 +77,8 @@ impl TravRay {
     pub(crate) const STAND_IN: Self = Self {
         range: RayRange { origin: Vec3::ZERO, dir: Vec3::X, t_near: 0.0, t_far: 0.0 },
         ordinary: true,
+        far: 0.0,
+        steady: true,
         forms: Forms::EXACT,
     };
 
@@ -90,7 +96,9 @@ impl TravRay {
         let (t_near, t_far) = (ray.t_near, ray.t_far.min(f32::MAX));
         // Adding +0 turns -0 into +0. Ordinary numbers are finite.
         let dir = ray.dir + Vec3::ZERO;
-        let ordinary = is_ordinary(ray.origin, dir);
+        let (size, place) = (dir.abs(), ray.origin.abs());
+        let ordinary = is_ordinary(size, place);
+        let steady = ordinary && (size.min_element() > 0.0 || slabs::is_steady(size.max_element()));
         let finite = ordinary || (ray.origin.is_finite() && dir.is_finite());
         // A NaN t_far would be lost in `min`, so it is looked at itself.
         if !finite || dir == Vec3::ZERO || ray.t_far.is_nan() || !(t_near <= t_far && t_far >= 0.0) {
@@ -99,6 +107,8 @@ impl TravRay {
         Some(Self {
             range: RayRange { origin: ray.origin, dir, t_near: t_near.max(0.0) + 0.0, t_far: t_far + 0.0 },
             ordinary,
+            far: place.max_element(),
+            steady,
             forms,
         })
     }
@@ -113,6 +123,18 @@ impl TravRay {
     #[inline(always)]
     pub(super) fn inv(&self) -> Vec3 {
         reciprocal(self.range.dir)
+    }
+
+    /// The greatest size of the origin's coordinates.
+    #[inline(always)]
+    pub(super) fn far(&self) -> f32 {
+        self.far
+    }
+
+    /// True for ordinary rays that run along no plane, or are neither very long nor very short.
+    #[inline(always)]
+    pub(super) fn is_steady(&self) -> bool {
+        self.steady
     }
 
     /// How the ray is tested.
@@ -135,12 +157,12 @@ fn reciprocal(dir: Vec3) -> Vec3 {
     (Vec3A::ONE / Vec3A::from(dir)).into()
 }
 
-/// True when every nonzero |dir| component is in [2^-60, 2^60] and |origin| is at most 2^60.
+/// True when every nonzero |dir| component (`size`) is in [2^-60, 2^60] and |origin| (`place`) is at most 2^60.
 #[inline(always)]
-fn is_ordinary(origin: Vec3, dir: Vec3) -> bool {
-    let size = dir.abs();
+fn is_ordinary(size: Vec3, place: Vec3) -> bool {
     let large_enough = size.cmpge(Vec3::splat(1.0 / ORDINARY_MAX)) | size.cmpeq(Vec3::ZERO);
-    let small_enough = size.max(origin.abs()).cmple(Vec3::splat(ORDINARY_MAX));
+    // NaN is lost in `max`, so both are compared.
+    let small_enough = size.cmple(Vec3::splat(ORDINARY_MAX)) & place.cmple(Vec3::splat(ORDINARY_MAX));
     (large_enough & small_enough).all()
 }
 

@@ -89,34 +89,38 @@ impl<L: Lanes<Elem = f32>> Slab<L> {
 /// True when [`Slab`] is proven for the ray and planes up to `reach` from 0.
 #[inline(always)]
 pub(super) fn fits(ray: &TravRay, reach: f32) -> bool {
-    let range = ray.range();
-    let (far, size) = (range.origin.abs().max_element(), range.dir.abs());
-    let steady = size.min_element() > 0.0 || (1.0 / STEADY..=STEADY).contains(&size.max_element());
-    ray.is_ordinary() && reach <= ORDINARY_MAX && far <= FAR * reach && steady
+    ray.is_steady() && ray.far() <= FAR * reach && reach <= ORDINARY_MAX
 }
 
-/// The slabs of one ray on each axis.
+/// True for a `|d|∞` that [`Slab`] is proven for where the ray runs along a plane.
 #[inline(always)]
-pub(super) fn of_ray<S: Simd>(ray: &TravRay, reach: f32) -> [Slab<f32>; 3] {
-    let range = ray.range();
-    let ([x, y, z], [dx, dy, dz]) = (range.origin.to_array(), range.dir.to_array());
-    let extent = Extent {
-        size: S::F4::splat(range.dir.abs().max_element()),
-        span: S::F4::splat(range.origin.abs().max_element() + reach),
+pub(super) fn is_steady(size: f32) -> bool {
+    (1.0 / STEADY..=STEADY).contains(&size)
+}
+
+/// One ray against two boxes at once: factor and summand of each axis for lanes of entry, entry, negated exit, negated exit. As [`Slab`], lane
+/// by lane: with the factor `-B` of an exit, what is added is again `-o` times the factor, less its pad.
+#[inline(always)]
+pub(super) fn of_pair<S: Simd>(ray: &TravRay, reach: f32) -> ([S::F4; 3], [S::F4; 3]) {
+    let (range, inv) = (ray.range(), ray.inv());
+    let (ends, pad) = match ray.forms().nodes {
+        Precision::Exact => ([SHRINK, SHRINK, -GROW, -GROW], PAD),
+        Precision::Fast => ([1.0, 1.0, -1.0, -1.0], 0.0),
     };
-    // The fourth lane repeats the third, so that it takes no way of its own.
-    let slab = Slab::new(S::F4::load(&[x, y, z, z]), S::F4::load(&[dx, dy, dz, dz]), &extent, ray.forms().nodes);
-    let mut rows = [[0.0; 4]; 4];
-    slab.entry_mul.store(&mut rows[0]);
-    slab.entry_add.store(&mut rows[1]);
-    slab.exit_mul.store(&mut rows[2]);
-    slab.exit_add.store(&mut rows[3]);
-    let [a, b, c, d] = rows;
-    [
-        Slab { entry_mul: a[0], entry_add: b[0], exit_mul: c[0], exit_add: d[0] },
-        Slab { entry_mul: a[1], entry_add: b[1], exit_mul: c[1], exit_add: d[1] },
-        Slab { entry_mul: a[2], entry_add: b[2], exit_mul: c[2], exit_add: d[2] },
-    ]
+    let (ends, pad) = (S::F4::load(&ends), S::F4::splat(pad));
+    let mut mul = [ends; 3];
+    let mut add = [ends; 3];
+    for axis in 0..3 {
+        let (mut inv, mut raise) = (inv[axis], 0.0);
+        if range.dir[axis] == 0.0 {
+            let size = range.dir.abs().max_element();
+            (inv, raise) = (STEEP / size, (ray.far() + reach) * 1.001 / size);
+        }
+        mul[axis] = S::F4::splat(inv) * ends;
+        let place = S::F4::splat(range.origin[axis]) * mul[axis];
+        add[axis] = -(place + place.abs() * pad) + S::F4::load(&[0.0, 0.0, -raise, -raise]);
+    }
+    (mul, add)
 }
 
 #[cfg(test)]
@@ -138,19 +142,25 @@ mod tests {
     }
 
     impl Task for Crossing<'_> {
-        type Output = [[f32; 2]; 3];
+        /// On each axis entry and exit of a single ray, then of a packet.
+        type Output = [[f32; 4]; 3];
 
         #[inline(always)]
         fn run<S: Simd>(self) -> Self::Output {
-            let slabs = of_ray::<S>(self.ray, self.reach);
-            let mut out = [[0.0; 2]; 3];
+            let (mul, add) = of_pair::<S>(self.ray, self.reach);
+            let (origin, dir) = (self.ray.range().origin.to_array(), self.ray.range().dir.to_array());
+            let splat3 = |v: [f32; 3]| v.map(S::F::splat);
+            let extent = Extent::new(splat3(origin), splat3(dir), self.reach);
+            let mut out = [[0.0; 4]; 3];
             for axis in 0..3 {
-                let (slab, plane) = (slabs[axis], S::F4::splat(self.planes[axis]));
-                let mut row = [0.0; 4];
-                plane.mul_add_loose(S::F4::splat(slab.entry_mul), S::F4::splat(slab.entry_add)).store(&mut row);
-                out[axis][0] = row[0];
-                plane.mul_add_loose(S::F4::splat(slab.exit_mul), S::F4::splat(slab.exit_add)).store(&mut row);
-                out[axis][1] = row[0];
+                let (mut row, mut rows) = ([0.0; 4], [[0.0; 16]; 2]);
+                S::F4::splat(self.planes[axis]).mul_add_loose(mul[axis], add[axis]).store(&mut row);
+                let plane = S::F::splat(self.planes[axis]);
+                let nodes = self.ray.forms().nodes;
+                let slab = Slab::new(S::F::splat(origin[axis]), S::F::splat(dir[axis]), &extent, nodes);
+                plane.mul_add_loose(slab.entry_mul, slab.entry_add).store(&mut rows[0]);
+                plane.mul_add_loose(slab.exit_mul, slab.exit_add).store(&mut rows[1]);
+                out[axis] = [row[0], -row[2], rows[0][0], rows[1][0]];
             }
             out
         }
@@ -188,9 +198,9 @@ mod tests {
             let limit = far / f64::from(ray.range().dir.abs().max_element());
             for level in SimdLevel::available() {
                 let crossed = dispatch(level, Crossing { ray: &ray, reach, planes });
-                for axis in 0..3 {
+                for (axis, ends) in [0, 1, 2, 0, 1, 2].into_iter().zip([[0, 1]; 3].into_iter().chain([[2, 3]; 3])) {
                     let distance = f64::from(planes[axis]) - f64::from(origin[axis]);
-                    let [entry, exit] = crossed[axis].map(f64::from);
+                    let [entry, exit] = ends.map(|end| f64::from(crossed[axis][end]));
                     prop_assert!(entry.is_finite() && exit.is_finite());
                     let d = f64::from(ray.range().dir[axis]);
                     if d == 0.0 {
@@ -211,8 +221,8 @@ mod tests {
         let ray = TravRay::new(&Ray::new(Vec3::new(0.5, 0.5, -3.0), Vec3::Z)).unwrap();
         for level in SimdLevel::available() {
             let [beyond, below, _] = dispatch(level, Crossing { ray: &ray, reach: 4.0, planes: [0.6, 0.4, 1.0] });
-            assert!(beyond[0] > 1e4, "{level}: a lower plane above the ray is entered late: {beyond:?}");
-            assert!(below[1] < -1e4, "{level}: an upper plane below the ray is left at once: {below:?}");
+            assert!(beyond[0].min(beyond[2]) > 1e4, "{level}: a lower plane above the ray is entered late: {beyond:?}");
+            assert!(below[1].max(below[3]) < -1e4, "{level}: an upper plane below the ray is left at once: {below:?}");
         }
     }
 }

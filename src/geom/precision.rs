@@ -43,7 +43,7 @@ impl FromStr for Precision {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct Forms {
     /// Boxes and slabs that a ray may meet. Fast: `plane * (1/d) - origin * (1/d)` in one fused operation of `f32`, neither end
-    /// widened, so a box that a ray touches at an edge, or that lies far from the origin for its size, may be lost. In `bvh2` and `ssh`; the
+    /// widened, so a box that a ray touches at an edge, or that lies far from the origin for its size, may be lost. In `bvh2`; the
     /// other structures have the exact form only.
     pub nodes: Precision,
     /// Triangles that a ray may hit. Fast: Möller and Trumbore's test in `f32` without bounds, so a ray may slip through a shared edge,

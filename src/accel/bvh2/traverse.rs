@@ -49,19 +49,11 @@ fn lanes<S: Simd>(entry: f32, exit: f32) -> S::F4 {
 impl<S: Simd> FastNode<S> {
     #[inline(always)]
     fn new(ray: &TravRay, reach: f32, limit: f32) -> Self {
-        let (range, [x, y, z]) = (ray.range(), slabs::of_ray::<S>(ray, reach));
+        let (range, (mul, add)) = (ray.range(), slabs::of_pair::<S>(ray, reach));
         let dir = range.dir;
         Self {
-            mul: [
-                lanes::<S>(x.entry_mul, x.exit_mul),
-                lanes::<S>(y.entry_mul, y.exit_mul),
-                lanes::<S>(z.entry_mul, z.exit_mul),
-            ],
-            add: [
-                lanes::<S>(x.entry_add, x.exit_add),
-                lanes::<S>(y.entry_add, y.exit_add),
-                lanes::<S>(z.entry_add, z.exit_add),
-            ],
+            mul,
+            add,
             swap: [S::F4::swap(dir.x < 0.0), S::F4::swap(dir.y < 0.0), S::F4::swap(dir.z < 0.0)],
             limits: lanes::<S>(range.t_near, limit),
             t_near: range.t_near,
