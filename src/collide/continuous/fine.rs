@@ -81,9 +81,9 @@ impl Fine {
         let mut fine = Self { corners: [[Two { high: 0.0, low: 0.0 }; 8]; 3], reach: DVec3::ZERO };
         for (i, points) in [start, end].into_iter().enumerate() {
             for (j, &(a, b)) in pairs.iter().enumerate() {
-                for axis in 0..3 {
+                for (axis, component) in fine.corners.iter_mut().enumerate() {
                     let value = Two::sum(points[a][axis] * scale, -(points[b][axis] * scale));
-                    fine.corners[axis][4 * i + j] = value;
+                    component[4 * i + j] = value;
                     fine.reach[axis] = fine.reach[axis].max(value.high.abs());
                 }
             }
