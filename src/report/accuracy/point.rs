@@ -24,7 +24,7 @@ impl Point {
 
 /// True where [`Forms::nodes`] has a fast form.
 fn has_fast_nodes(kind: AccelKind) -> bool {
-    !matches!(kind.name(), "list" | "grid" | "kdtree" | "grug" | "events")
+    kind.name() == "bvh2"
 }
 
 /// What is left out, in words: `exact`, or the names of the fast steps.

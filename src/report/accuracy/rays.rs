@@ -262,7 +262,7 @@ fn turns<'a>(source: &'a Source, quest: &Quest, built: &'a Built, options: &Opti
 
 /// True where 16 rays are walked together.
 pub(super) fn walks_packets(accel: &AnyAccel) -> bool {
-    !matches!(accel.kind().name(), "list" | "grid" | "kdtree" | "grug" | "events")
+    matches!(accel.kind().name(), "bvh2" | "ssh")
 }
 
 /// How many rays cost at most `budget`, by a sample of them.
