@@ -123,6 +123,20 @@ pub(super) fn of_pair<S: Simd>(ray: &TravRay, reach: f32) -> ([S::F4; 3], [S::F4
     (mul, add)
 }
 
+/// The slabs of one ray on each axis, for any number of boxes: those of [`of_pair`].
+#[inline(always)]
+pub(super) fn of_ray<S: Simd>(ray: &TravRay, reach: f32) -> [Slab<f32>; 3] {
+    let (mul, add) = of_pair::<S>(ray, reach);
+    let mut out = [Slab { entry_mul: 0.0, entry_add: 0.0, exit_mul: 0.0, exit_add: 0.0 }; 3];
+    for axis in 0..3 {
+        let (mut muls, mut adds) = ([0.0; 4], [0.0; 4]);
+        mul[axis].store(&mut muls);
+        add[axis].store(&mut adds);
+        out[axis] = Slab { entry_mul: muls[0], entry_add: adds[0], exit_mul: -muls[2], exit_add: -adds[2] };
+    }
+    out
+}
+
 #[cfg(test)]
 mod tests {
     use glam::Vec3;

@@ -10,8 +10,6 @@ use super::{SimdLevel, Task};
 pub trait Simd: Copy + Send + Sync + 'static {
     /// The level that the implementor stands for.
     const LEVEL: SimdLevel;
-    /// True when [`Lanes::mul_add_loose`] rounds once.
-    const FUSED: bool;
     /// Four f32: the planes of two sibling boxes on one axis.
     type F4: Halves;
     /// Eight f32: a plane of each of eight boxes.

@@ -11,7 +11,6 @@ pub struct Scalar;
 
 impl Simd for Scalar {
     const LEVEL: SimdLevel = SimdLevel::Scalar;
-    const FUSED: bool = false;
     type F4 = Array<f32, 4>;
     type F8 = Array<f32, 8>;
     type U8 = [u32; 8];

@@ -29,7 +29,6 @@ pub(super) struct Avx512;
 
 impl Simd for Avx2 {
     const LEVEL: SimdLevel = SimdLevel::Avx2;
-    const FUSED: bool = true;
     type F4 = F32x4;
     type F8 = F32x8;
     type U8 = __m256i;
@@ -88,7 +87,6 @@ impl Simd for Avx2 {
 
 impl Simd for Avx512 {
     const LEVEL: SimdLevel = SimdLevel::Avx512;
-    const FUSED: bool = true;
     type F4 = F32x4;
     type F8 = F32x8;
     type U8 = __m256i;

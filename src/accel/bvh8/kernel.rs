@@ -8,7 +8,8 @@ use crate::{
     accel::{
         Closest, Counter, HitSink, TravRay,
         block::TriBlock,
-        query::{ORDINARY_MAX, SLACK},
+        query::SLACK,
+        slabs::{self, Slab},
         wide::{
             WIDTH,
             walk::{self, Kernel},
@@ -17,113 +18,34 @@ use crate::{
     simd::{Lanes, Scalar, Simd, Task},
 };
 
-/// Half a unit in the last place of 1.
-const U: f32 = 1.0 / 16_777_216.0;
-
-/// Relative slack between entries and exits.
-pub(super) const GROW: f32 = 1.0 + 8.0 * U;
-
-/// The limit with all slack. At most `f32::MAX`, or infinite, which no finite product exceeds.
-#[inline(always)]
-pub(super) fn padded(limit: f32) -> f32 {
-    limit * GROW + SLACK
-}
-
-/// What a ray or several are to a plane: two numbers an axis and end, and which plane of an axis is the nearer.
-///
-/// With `FUSED` a plane is passed at `p inv - offset`, else at `(p - offset) inv`.
-pub(super) struct Ends<S: Simd, const FUSED: bool> {
-    pub(super) near_inv: [S::F8; 3],
-    pub(super) near_offset: [S::F8; 3],
-    pub(super) far_inv: [S::F8; 3],
-    pub(super) far_offset: [S::F8; 3],
-    /// 1 where rays run downward.
-    pub(super) backward: [usize; 3],
-}
-
-/// Entries into all boxes, from `near` on, and exits, up to `far`.
-#[inline(always)]
-pub(super) fn slabs<S: Simd, const FUSED: bool>(
-    node: &Node,
-    ends: &Ends<S, FUSED>,
-    mut near: S::F8,
-    mut far: S::F8,
-) -> (S::F8, S::F8) {
-    for axis in 0..3 {
-        let side = ends.backward[axis] & 1;
-        let (first, last) = (S::F8::load(&node.planes[axis][side]), S::F8::load(&node.planes[axis][side ^ 1]));
-        let (entry, exit) = if FUSED {
-            (
-                first.mul_sub_loose(ends.near_inv[axis], ends.near_offset[axis]),
-                last.mul_sub_loose(ends.far_inv[axis], ends.far_offset[axis]),
-            )
-        } else {
-            (
-                (first - ends.near_offset[axis]) * ends.near_inv[axis],
-                (last - ends.far_offset[axis]) * ends.far_inv[axis],
-            )
-        };
-        near = entry.max(near);
-        far = exit.min(far);
-    }
-    (near, far)
-}
-
-/// All boxes at once, in f32.
-///
-/// # Proof that no box is missed, with one fused multiply-add a plane
-/// For an ordinary ray ([`TravRay::is_ordinary`]) without a zero in its direction and boxes within 2^60 of 0, with r = fl(1/d) = (1 + e) / d,
-/// |e| <= u: the near offsets are at least o r and the far ones at most o r, since fl(o r) is off by at most u |fl(o r)| (1 + u) and
-/// 2 u |fl(o r)| is added or taken away, rounded itself by another u. So before its one rounding an entry is at most (p - o) r and an
-/// exit at least (p - o) r. Where these are not negative they are t (1 + e) with the t of exact arithmetic, and with the
-/// rounding of the result within 2.01 u of it; products that underflow are off by less than 2^-126. Where the exact entry is negative the
-/// computed one is not positive, and `t_near` takes its place. So entries and exits that meet in truth satisfy entry <= exit (1 + 8 u) +
-/// 2^-126. Nothing overflows: |p r| <= 2^120.
-///
-/// # With a subtraction and a product
-/// For directions with zeros, and for levels without fused multiply-add, (p - o) is rounded first, which costs one more u. On an axis with `d = 0` (always
-/// +0) the reciprocal is +inf: a plane on the wrong side gives an infinity that misses the box, as the ray does in truth; one on the right
-/// side an infinity that does not count, and the origin on a plane 0 * inf = NaN, which loses in the minimum and the maximum, whose second operand is the
-/// running value.
-struct FastKernel<S: Simd, const FUSED: bool> {
-    ends: Ends<S, FUSED>,
+/// All boxes at once, in f32. The proof at [`Slab`] holds lane by lane; with 2^-126 of slack on the comparison a box that the ray meets within
+/// `[t_near, limit]` is never lost.
+struct FastKernel<S: Simd> {
+    slabs: [Slab<f32>; 3],
+    /// 1 where the ray runs downward.
+    backward: [usize; 3],
     t_near: S::F8,
-    /// With slack.
     limit: S::F8,
+    /// The limit with slack.
     cull: f32,
 }
 
-impl<S: Simd, const FUSED: bool> FastKernel<S, FUSED> {
+impl<S: Simd> FastKernel<S> {
     #[inline(always)]
-    fn new(ray: &TravRay, limit: f32) -> Self {
-        let range = ray.range();
-        let inv = ray.inv();
-        let (near, far) = if FUSED {
-            let offset = range.origin * inv;
-            let pad = offset.abs() * (2.0 * U);
-            (offset + pad, offset - pad)
-        } else {
-            (range.origin, range.origin)
-        };
-        let inv = [S::F8::splat(inv.x), S::F8::splat(inv.y), S::F8::splat(inv.z)];
+    fn new(ray: &TravRay, reach: f32, limit: f32) -> Self {
+        let (range, slabs) = (ray.range(), slabs::of_ray::<S>(ray, reach));
         let dir = range.dir;
-        let cull = padded(limit);
         Self {
-            ends: Ends {
-                near_inv: inv,
-                near_offset: [S::F8::splat(near.x), S::F8::splat(near.y), S::F8::splat(near.z)],
-                far_inv: inv,
-                far_offset: [S::F8::splat(far.x), S::F8::splat(far.y), S::F8::splat(far.z)],
-                backward: [usize::from(dir.x < 0.0), usize::from(dir.y < 0.0), usize::from(dir.z < 0.0)],
-            },
+            slabs,
+            backward: [usize::from(dir.x < 0.0), usize::from(dir.y < 0.0), usize::from(dir.z < 0.0)],
             t_near: S::F8::splat(range.t_near),
-            limit: S::F8::splat(cull),
-            cull,
+            limit: S::F8::splat(limit),
+            cull: limit + SLACK,
         }
     }
 }
 
-impl<S: Simd, const FUSED: bool> Kernel<Bvh8> for FastKernel<S, FUSED> {
+impl<S: Simd> Kernel<Bvh8> for FastKernel<S> {
     type Mark = f32;
     type Kids = [f32; WIDTH];
 
@@ -134,9 +56,17 @@ impl<S: Simd, const FUSED: bool> Kernel<Bvh8> for FastKernel<S, FUSED> {
 
     #[inline(always)]
     fn test(&self, node: &Node, _entry: f32, entries: &mut [f32; WIDTH]) -> u32 {
-        let (near, far) = slabs(node, &self.ends, self.t_near, self.limit);
+        let (mut near, mut far) = (self.t_near, self.limit);
+        for axis in 0..3 {
+            let (side, slab) = (self.backward[axis] & 1, &self.slabs[axis]);
+            let (first, last) = (S::F8::load(&node.planes[axis][side]), S::F8::load(&node.planes[axis][side ^ 1]));
+            let entry = first.mul_add_loose(S::F8::splat(slab.entry_mul), S::F8::splat(slab.entry_add));
+            let exit = last.mul_add_loose(S::F8::splat(slab.exit_mul), S::F8::splat(slab.exit_add));
+            near = entry.max(near);
+            far = exit.min(far);
+        }
         near.store(entries);
-        near.le(far.mul_add_loose(S::F8::splat(GROW), S::F8::splat(SLACK)))
+        (near - far).le(S::F8::splat(SLACK))
     }
 
     #[inline(always)]
@@ -151,8 +81,9 @@ impl<S: Simd, const FUSED: bool> Kernel<Bvh8> for FastKernel<S, FUSED> {
 
     #[inline(always)]
     fn limit(&mut self, best: &Closest) {
-        self.cull = padded(best.t_cull());
-        self.limit = S::F8::splat(self.cull);
+        let limit = best.t_cull();
+        self.cull = limit + SLACK;
+        self.limit = S::F8::splat(limit);
     }
 
     #[inline(always)]
@@ -251,14 +182,8 @@ impl<C: Counter, K: HitSink> Task for ClosestFrom<'_, C, K> {
     #[inline(always)]
     fn run<S: Simd>(self) {
         let Self { tree, start, ray, best, sink, count } = self;
-        let start = (start, ray.range().t_near);
-        if S::FUSED && is_slanted(ray) {
-            let test = FastKernel::<S, true>::new(ray, best.t_cull());
-            walk::closest::<S, _, _, C, K>(tree, test, start, ray, best, sink, count);
-        } else {
-            let test = FastKernel::<S, false>::new(ray, best.t_cull());
-            walk::closest::<S, _, _, C, K>(tree, test, start, ray, best, sink, count);
-        }
+        let test = FastKernel::<S>::new(ray, tree.reach, best.t_cull());
+        walk::closest::<S, _, _, C, K>(tree, test, (start, ray.range().t_near), ray, best, sink, count);
     }
 }
 
@@ -277,19 +202,9 @@ impl<C: Counter, K: HitSink> Task for OccludedFrom<'_, C, K> {
     #[inline(always)]
     fn run<S: Simd>(self) -> bool {
         let Self { tree, start, ray, sink, count } = self;
-        let (start, t_far) = ((start, ray.range().t_near), ray.range().t_far);
-        if S::FUSED && is_slanted(ray) {
-            walk::occluded::<S, _, _, C, K>(tree, &FastKernel::<S, true>::new(ray, t_far), start, ray, sink, count)
-        } else {
-            walk::occluded::<S, _, _, C, K>(tree, &FastKernel::<S, false>::new(ray, t_far), start, ray, sink, count)
-        }
+        let test = FastKernel::<S>::new(ray, tree.reach, ray.range().t_far);
+        walk::occluded::<S, _, _, C, K>(tree, &test, (start, ray.range().t_near), ray, sink, count)
     }
-}
-
-/// True when the ray is parallel to no plane of a box.
-#[inline(always)]
-pub(super) fn is_slanted(ray: &TravRay) -> bool {
-    !ray.range().dir.cmpeq(glam::Vec3::ZERO).any()
 }
 
 impl Bvh8 {
@@ -299,8 +214,8 @@ impl Bvh8 {
 
     /// True when f32 node tests are proven for this ray and these boxes.
     #[inline(always)]
-    pub(super) fn is_ordinary(&self, ray: &TravRay) -> bool {
-        ray.is_ordinary() && self.reach <= ORDINARY_MAX
+    pub(super) fn fits(&self, ray: &TravRay) -> bool {
+        slabs::fits(ray, self.reach)
     }
 
     #[inline(always)]
@@ -311,7 +226,7 @@ impl Bvh8 {
         sink: &K,
         count: &mut C,
     ) {
-        if self.is_ordinary(ray) {
+        if self.fits(ray) {
             // Called, so that packets which fall apart share the code.
             S::call(ClosestFrom { tree: self, start: Self::root(), ray, best, sink, count });
         } else {
@@ -334,7 +249,7 @@ impl Bvh8 {
         sink: &K,
         count: &mut C,
     ) -> bool {
-        if self.is_ordinary(ray) {
+        if self.fits(ray) {
             S::call(OccludedFrom { tree: self, start: Self::root(), ray, sink, count })
         } else {
             self.occluded_wide(ray, sink, count)
@@ -349,13 +264,12 @@ impl Bvh8 {
     }
 }
 
-/// The children of a node that a ray meets: fused, plain and in f64.
+/// The children of a node that a ray meets, in f32 and in f64.
 #[cfg(test)]
 #[inline(always)]
-pub(super) fn met<S: Simd>(ray: &TravRay, node: &Node) -> [u32; 3] {
+pub(super) fn met<S: Simd>(ray: &TravRay, node: &Node, reach: f32) -> [u32; 2] {
     let t_far = ray.range().t_far;
-    let (fused, plain) = (FastKernel::<S, true>::new(ray, t_far), FastKernel::<S, false>::new(ray, t_far));
-    let wide = WideKernel::new(ray, f64::from(t_far));
+    let (fast, wide) = (FastKernel::<S>::new(ray, reach, t_far), WideKernel::new(ray, f64::from(t_far)));
     let (mut entries, mut wide_entries) = ([0.0; WIDTH], [0.0; WIDTH]);
-    [fused.test(node, 0.0, &mut entries), plain.test(node, 0.0, &mut entries), wide.test(node, 0.0, &mut wide_entries)]
+    [fast.test(node, 0.0, &mut entries), wide.test(node, 0.0, &mut wide_entries)]
 }

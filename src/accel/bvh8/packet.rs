@@ -2,7 +2,7 @@
 
 use super::{
     Bvh8,
-    kernel::{ClosestFrom, Ends, GROW, OccludedFrom, slabs},
+    kernel::{ClosestFrom, OccludedFrom},
     node::{Link, Node},
 };
 use crate::{
@@ -10,58 +10,69 @@ use crate::{
         Closest, Counter, HitSink, TravRay,
         block::TriBlock,
         packet::{PacketRays, bits},
-        query::{GROW as GROW_EACH, SHRINK, SLACK},
+        query::SLACK,
+        slabs::{Extent, Slab},
         wide::{
             WIDTH,
-            packet::{self, Entry, FEW, Together, range, spreads},
+            packet::{self, Entry, FEW, Spread, Together, range, spreads},
             walk,
         },
     },
+    geom::Precision,
     simd::{Lanes, Simd},
 };
 
+/// Relative slack between the entries and exits of all rays together: 8 * 2^-24, for three roundings of each.
+const GROW: f32 = 1.0 + 8.0 / 16_777_216.0;
+
+/// `(plane - origin) * inv` of the first or the last ray to pass a plane.
+#[derive(Clone, Copy)]
+struct End<S: Simd> {
+    origin: S::F8,
+    inv: S::F8,
+}
+
 /// All rays by their bounds, and each of them by itself: [`Spread::ends`](crate::accel::wide::packet::Spread::ends) has the proof
-/// of the first, and that of the second is at `bvh2`'s node test, lane by lane.
+/// of the first, and that of the second is at [`Slab`], lane by lane.
 struct Packet<S: Simd> {
-    ends: Ends<S, false>,
+    /// By axis, entries and exits.
+    ends: [[End<S>; 2]; 3],
+    /// 1 where the rays run downward.
+    backward: [usize; 3],
     all_near: S::F8,
     all_far: S::F8,
     active: u32,
-    origin: [S::F; 3],
-    inv_near: [S::F; 3],
-    inv_far: [S::F; 3],
+    slabs: [Slab<S::F>; 3],
     near: S::F,
     limit: S::F,
 }
 
 impl<S: Simd> Packet<S> {
     #[inline(always)]
-    fn new(packet: &PacketRays, active: u32, backward: [bool; 3]) -> Self {
+    fn new(packet: &PacketRays, (active, backward): (u32, [bool; 3]), reach: f32, nodes: Precision) -> Self {
         let [x, y, z] = spreads::<S>(packet, active);
-        let ends = [x.ends(backward[0]), y.ends(backward[1]), z.ends(backward[2])];
-        let origin =
-            |end: usize| [S::F8::splat(ends[0][end].0), S::F8::splat(ends[1][end].0), S::F8::splat(ends[2][end].0)];
-        let inv =
-            |end: usize| [S::F8::splat(ends[0][end].1), S::F8::splat(ends[1][end].1), S::F8::splat(ends[2][end].1)];
-        let ends = Ends {
-            near_inv: inv(0),
-            near_offset: origin(0),
-            far_inv: inv(1),
-            far_offset: origin(1),
-            backward: [usize::from(backward[0]), usize::from(backward[1]), usize::from(backward[2])],
+        let ends = |spread: Spread, backward: bool| {
+            let [entry, exit] = spread.ends(backward);
+            [
+                End { origin: S::F8::splat(entry.0), inv: S::F8::splat(entry.1) },
+                End { origin: S::F8::splat(exit.0), inv: S::F8::splat(exit.1) },
+            ]
         };
-        let (one, shrink, grow) = (S::F::splat(1.0), S::F::splat(SHRINK), S::F::splat(GROW_EACH));
-        let [dx, dy, dz] = &packet.dir32;
-        let inv = [one / S::F::load(dx), one / S::F::load(dy), one / S::F::load(dz)];
-        let [ox, oy, oz] = &packet.origin32;
+        let ([ox, oy, oz], [dx, dy, dz]) = (&packet.origin32, &packet.dir32);
+        let origin = [S::F::load(ox), S::F::load(oy), S::F::load(oz)];
+        let dir = [S::F::load(dx), S::F::load(dy), S::F::load(dz)];
+        let extent = Extent::new(origin, dir, reach);
         Self {
-            ends,
+            ends: [ends(x, backward[0]), ends(y, backward[1]), ends(z, backward[2])],
+            backward: [usize::from(backward[0]), usize::from(backward[1]), usize::from(backward[2])],
             all_near: S::F8::splat(range(&packet.t_near32, active)[0]),
             all_far: S::F8::splat(range(&packet.t_cull, active)[1]),
             active,
-            origin: [S::F::load(ox), S::F::load(oy), S::F::load(oz)],
-            inv_near: [inv[0] * shrink, inv[1] * shrink, inv[2] * shrink],
-            inv_far: [inv[0] * grow, inv[1] * grow, inv[2] * grow],
+            slabs: [
+                Slab::new(origin[0], dir[0], &extent, nodes),
+                Slab::new(origin[1], dir[1], &extent, nodes),
+                Slab::new(origin[2], dir[2], &extent, nodes),
+            ],
             near: S::F::load(&packet.t_near32),
             limit: S::F::load(&packet.t_cull),
         }
@@ -80,7 +91,13 @@ impl<S: Simd> Together<S, Bvh8> for Packet<S> {
 
     #[inline(always)]
     fn all(&self, node: &Node, _mark: (), entries: &mut [f32; WIDTH]) -> u32 {
-        let (near, far) = slabs(node, &self.ends, self.all_near, self.all_far);
+        let (mut near, mut far) = (self.all_near, self.all_far);
+        for axis in 0..3 {
+            let (side, [entry, exit]) = (self.backward[axis] & 1, &self.ends[axis]);
+            let (first, last) = (S::F8::load(&node.planes[axis][side]), S::F8::load(&node.planes[axis][side ^ 1]));
+            near = ((first - entry.origin) * entry.inv).max(near);
+            far = ((last - exit.origin) * exit.inv).min(far);
+        }
         near.store(entries);
         near.le(far.mul_add_loose(S::F8::splat(GROW), S::F8::splat(SLACK)))
     }
@@ -97,11 +114,10 @@ impl<S: Simd> Together<S, Bvh8> for Packet<S> {
     fn each(&self, node: &Node, slot: usize, _near: &S::F) -> (u32, S::F) {
         let (mut near, mut far) = (self.near, self.limit);
         for axis in 0..3 {
-            let side = self.ends.backward[axis] & 1;
-            let entry = S::F::splat(node.planes[axis][side][slot]) - self.origin[axis];
-            let exit = S::F::splat(node.planes[axis][side ^ 1][slot]) - self.origin[axis];
-            near = (entry * self.inv_near[axis]).max(near);
-            far = (exit * self.inv_far[axis]).min(far);
+            let (side, slab) = (self.backward[axis] & 1, &self.slabs[axis]);
+            let (first, last) = (node.planes[axis][side][slot], node.planes[axis][side ^ 1][slot]);
+            near = S::F::splat(first).mul_add_loose(slab.entry_mul, slab.entry_add).max(near);
+            far = S::F::splat(last).mul_add_loose(slab.exit_mul, slab.exit_add).min(far);
         }
         ((near - far).le(S::F::splat(SLACK)), near)
     }
@@ -159,7 +175,7 @@ impl Bvh8 {
         for (start, end, mut left) in packet::lanes::<S>(rays.len(), active) {
             let (rays, best, sinks) = (&rays[start..end], &mut best[start..end], &sinks[start..end]);
             while left != 0 {
-                let (members, backward) = packet::group(|ray| self.is_ordinary(ray), rays, left);
+                let (members, backward) = packet::group(|ray| self.fits(ray), rays, left);
                 left &= !members;
                 if members.count_ones() > FEW {
                     self.closest_together::<S, C, K>(rays, members, backward, best, sinks, count);
@@ -186,7 +202,7 @@ impl Bvh8 {
         for (i, best) in best.iter().enumerate() {
             packet.set_limit(i, best);
         }
-        let together = Packet::<S>::new(&packet, mask, backward);
+        let together = Packet::<S>::new(&packet, (mask, backward), self.reach, rays[0].forms().nodes);
         let start = Entry { word: Self::root(), mask, mark: (), rays: together.near };
         packet::closest::<S, _, _, C, K>(self, together, start, rays, &mut packet, (best, sinks), count);
     }
@@ -204,11 +220,11 @@ impl Bvh8 {
         for (start, end, mut left) in packet::lanes::<S>(rays.len(), active) {
             let (rays, sinks) = (&rays[start..end], &sinks[start..end]);
             while left != 0 {
-                let (members, backward) = packet::group(|ray| self.is_ordinary(ray), rays, left);
+                let (members, backward) = packet::group(|ray| self.fits(ray), rays, left);
                 left &= !members;
                 if members.count_ones() > FEW {
                     let packet = PacketRays::new(rays, self.reach);
-                    let together = Packet::<S>::new(&packet, members, backward);
+                    let together = Packet::<S>::new(&packet, (members, backward), self.reach, rays[0].forms().nodes);
                     let root = Entry { word: Self::root(), mask: members, mark: (), rays: together.near };
                     let hits = packet::occluded::<S, _, _, C, K>(self, &together, root, rays, &packet, sinks, count);
                     blocked |= hits << start;
@@ -227,10 +243,11 @@ impl Bvh8 {
 /// The children of a node that a packet of equal rays meets: as a whole, and the rays one by one.
 #[cfg(test)]
 #[inline(always)]
-pub(super) fn met_together<S: Simd>(ray: &TravRay, node: &Node) -> [u32; 2] {
+pub(super) fn met_together<S: Simd>(ray: &TravRay, node: &Node, reach: f32) -> [u32; 2] {
     let rays = [*ray; 3];
     let dir = ray.range().dir;
-    let together = Packet::<S>::new(&PacketRays::new(&rays, 0.0), 7, [dir.x < 0.0, dir.y < 0.0, dir.z < 0.0]);
+    let signs = [dir.x < 0.0, dir.y < 0.0, dir.z < 0.0];
+    let together = Packet::<S>::new(&PacketRays::new(&rays, reach), (7, signs), reach, Precision::Exact);
     let mut entries = [0.0; WIDTH];
     let all = together.all(node, (), &mut entries);
     let mut each = 0;

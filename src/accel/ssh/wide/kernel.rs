@@ -8,7 +8,8 @@ use crate::{
     accel::{
         Closest, Counter, HitSink, TravRay,
         block::TriBlock,
-        query::{ORDINARY_MAX, SLACK},
+        query::SLACK,
+        slabs,
         ssh::node::Side,
         wide::{
             WIDTH, WideNode,
@@ -16,7 +17,7 @@ use crate::{
         },
     },
     geom::Aabb,
-    simd::{Lanes, Scalar, Simd, Task},
+    simd::{Halves, Lanes, Scalar, Simd, Task},
 };
 
 /// The part of a ray inside a child.
@@ -32,47 +33,57 @@ pub(super) struct Segments<T> {
     pub(super) far: [T; WIDTH],
 }
 
-/// Relative slack between entries and exits: 8 * 2^-24.
-pub(super) const GROW: f32 = 1.0 + 8.0 / 16_777_216.0;
-
-/// What is needed of one end of a segment: `(plane - origin) * inv`, by axis and by [`Side::row`].
-#[derive(Clone, Copy)]
-pub(super) struct End<S: Simd> {
-    pub(super) origin: [S::F8; 3],
-    pub(super) inv: [S::F8; 3],
-    /// For the fourth planes; the factor is NaN where a plane of that side moves the other end.
-    pub(super) row_origin: S::F8,
-    pub(super) row_inv: S::F8,
+/// Where one end of a segment is cut.
+pub(super) trait End<S: Simd>: Copy {
+    /// t of the planes of an axis.
+    fn at(&self, planes: S::F8, axis: usize) -> S::F8;
+    /// t of the fourth planes; NaN for sides that cut the other end.
+    fn at_row(&self, planes: S::F8, words: S::U8) -> S::F8;
 }
 
-impl<S: Simd> End<S> {
-    /// `exits` tells which end it is.
-    #[inline(always)]
-    pub(super) fn new(origin: [f32; 3], inv: [f32; 3], backward: [bool; 3], exits: bool) -> Self {
-        let mut rows = [[0.0; Side::ROWS], [f32::NAN; Side::ROWS]];
-        for axis in 0..3 {
-            rows[0][axis] = origin[axis];
-            rows[0][axis + 4] = origin[axis];
-            // A ray enters through a lower plane when it runs upward, and leaves through the upper one.
-            rows[1][axis + 4 * usize::from(backward[axis] != exits)] = inv[axis];
-        }
-        Self {
-            origin: [S::F8::splat(origin[0]), S::F8::splat(origin[1]), S::F8::splat(origin[2])],
-            inv: [S::F8::splat(inv[0]), S::F8::splat(inv[1]), S::F8::splat(inv[2])],
-            row_origin: S::F8::load(&rows[0]),
-            row_inv: S::F8::load(&rows[1]),
-        }
-    }
+/// One fused operation a plane: `plane * mul + add`.
+#[derive(Clone, Copy)]
+pub(super) struct Fused<S: Simd> {
+    mul: [f32; 3],
+    add: [f32; 3],
+    row_mul: S::F8,
+    row_add: S::F8,
+}
 
+impl<S: Simd> Fused<S> {
+    #[inline(always)]
+    fn new(mul: [f32; 3], add: [f32; 3], sides: [usize; 3]) -> Self {
+        Self { mul, add, row_mul: by_row::<S>(mul, sides), row_add: by_row::<S>(add, sides) }
+    }
+}
+
+impl<S: Simd> End<S> for Fused<S> {
     #[inline(always)]
     fn at(&self, planes: S::F8, axis: usize) -> S::F8 {
-        (planes - self.origin[axis]) * self.inv[axis]
+        planes.mul_add_loose(S::F8::splat(self.mul[axis]), S::F8::splat(self.add[axis]))
     }
 
     #[inline(always)]
     fn at_row(&self, planes: S::F8, words: S::U8) -> S::F8 {
-        (planes - S::picked::<FOURTH>(self.row_origin, words)) * S::picked::<FOURTH>(self.row_inv, words)
+        planes.mul_add_loose(S::picked::<FOURTH>(self.row_mul, words), S::picked::<FOURTH>(self.row_add, words))
     }
+}
+
+/// Rows of the sides that a ray enters through, or leaves through: the lower planes where it runs upward.
+#[inline(always)]
+pub(super) fn sides(backward: [bool; 3], exits: bool) -> [usize; 3] {
+    let side = |axis: usize| axis + 4 * usize::from(backward[axis] != exits);
+    [side(0), side(1), side(2)]
+}
+
+/// A table by [`Side::row`] with the numbers of these sides, NaN elsewhere.
+#[inline(always)]
+pub(super) fn by_row<S: Simd>(numbers: [f32; 3], sides: [usize; 3]) -> S::F8 {
+    let mut rows = [f32::NAN; Side::ROWS];
+    for (number, side) in numbers.into_iter().zip(sides) {
+        rows[side & 7] = number;
+    }
+    S::F8::load(&rows)
 }
 
 /// Inverts the bits of [`UPPER`] planes where the ray runs upward: they then mark entries.
@@ -82,17 +93,15 @@ pub(super) fn flips(backward: [bool; 3]) -> u32 {
     (x | y << 1 | z << 2) << UPPER
 }
 
-/// Segments of the children, from that of their node, and which of them are not surely empty. The two ends may belong to different
-/// rays, the first and the last to pass each plane.
+/// Segments of the children, from that of their node. The two ends may belong to different rays, the first and the last to pass each plane.
 #[inline(always)]
-pub(super) fn cut_all<S: Simd, const K: usize>(
+pub(super) fn cut_all<S: Simd, E: End<S>, const K: usize>(
     node: &Node<K>,
-    entry: &End<S>,
-    exit: &End<S>,
+    [entry, exit]: [&E; 2],
     flips: u32,
     segment: Segment<f32>,
     kids: &mut Segments<f32>,
-) -> u32 {
+) -> (S::F8, S::F8) {
     let raw = S::words(node.raw_words());
     let words = S::flipped(raw, flips);
     let (mut near, mut far) = (S::F8::splat(segment.near), S::F8::splat(segment.far));
@@ -116,63 +125,64 @@ pub(super) fn cut_all<S: Simd, const K: usize>(
     }
     near.store(&mut kids.near);
     far.store(&mut kids.far);
-    near.le(far.mul_add_loose(S::F8::splat(GROW), S::F8::splat(SLACK)))
+    (near, far)
 }
 
 const _: () = assert!(UPPER == 28);
 
-/// All planes of eight children at once, in f32.
-///
-/// # Proof that no half-space is missed
-/// Take an ordinary ray ([`TravRay::is_ordinary`]) and planes within 2^60 of 0. For `d != 0` a plane gives
-/// `t = fl(fl(p - o) * fl(1 / d))`, with three roundings within 3.01 u (u = 2^-24) of the exact t, but for an underflow of less than
-/// 2^-149; nothing overflows (2^61 * 2^60). Where the exact entry is negative, so is the computed one or it is 0, and the segment's near end, which is not negative, takes its
-/// place; a negative exit misses in truth. Ends that meet in truth thus satisfy `near <= far (1 + 8 u) + 2^-126`, also where one of them was inherited:
-/// it was computed in the same way. With `d = 0` (always +0, so never backward) the factor is +inf: a plane on the wrong side gives +inf as an entry or -inf
-/// as an exit and the half-space is missed, as it is in truth; on the right side -inf or +inf, and the origin on the plane 0 * inf = NaN: all lose, since
-/// the running value is the second operand.
+/// All planes of eight children at once, in f32. The proof at [`Slab`](slabs::Slab) holds lane by lane, for segments that were inherited too; with 2^-126 of slack on the
+/// comparison a segment that holds a common point of the half-spaces is never found empty.
 #[derive(Clone, Copy)]
 struct FastKernel<S: Simd> {
-    /// These differ in the factors of the fourth planes alone.
-    entry: End<S>,
-    exit: End<S>,
-    origin: [f32; 3],
-    inv: [f32; 3],
+    entry: Fused<S>,
+    exit: Fused<S>,
     backward: [bool; 3],
     flips: u32,
     limit: f32,
-    /// The limit with slack.
-    cull: f32,
-}
-
-#[inline(always)]
-pub(super) fn padded(limit: f32) -> f32 {
-    limit * GROW + SLACK
 }
 
 impl<S: Simd> FastKernel<S> {
     #[inline(always)]
-    fn new(ray: &TravRay, limit: f32) -> Self {
-        let range = ray.range();
-        let (origin, inv) = (range.origin.to_array(), ray.inv().to_array());
+    fn new(ray: &TravRay, reach: f32, limit: f32) -> Self {
+        let (range, [x, y, z]) = (ray.range(), slabs::of_ray::<S>(ray, reach));
         let backward = [range.dir.x < 0.0, range.dir.y < 0.0, range.dir.z < 0.0];
-        let (entry, exit) = (End::new(origin, inv, backward, false), End::new(origin, inv, backward, true));
-        Self { entry, exit, origin, inv, backward, flips: flips(backward), limit, cull: padded(limit) }
+        let entry_mul = [x.entry_mul, y.entry_mul, z.entry_mul];
+        let entry_add = [x.entry_add, y.entry_add, z.entry_add];
+        let exit_mul = [x.exit_mul, y.exit_mul, z.exit_mul];
+        let exit_add = [x.exit_add, y.exit_add, z.exit_add];
+        Self {
+            entry: Fused::new(entry_mul, entry_add, sides(backward, false)),
+            exit: Fused::new(exit_mul, exit_add, sides(backward, true)),
+            backward,
+            flips: flips(backward),
+            limit,
+        }
     }
 
     /// The ray's range within the root's box.
     #[inline(always)]
     fn clipped(&self, near: f32, bounds: &Aabb) -> Segment<f32> {
-        let (mut near, mut far) = (near, self.limit);
+        let (mut near, mut far) = (S::F4::splat(near), S::F4::splat(self.limit));
         for axis in 0..3 {
-            let (first, last) = if self.backward[axis] { (bounds.max, bounds.min) } else { (bounds.min, bounds.max) };
-            let entry = (first[axis] - self.origin[axis]) * self.inv[axis];
-            let exit = (last[axis] - self.origin[axis]) * self.inv[axis];
-            near = if entry > near { entry } else { near };
-            far = if exit < far { exit } else { far };
+            let (low, high) = (S::F4::splat(bounds.min[axis]), S::F4::splat(bounds.max[axis]));
+            (near, far) = self.cut_four::<S>([low, high], axis, near, far);
         }
-        Segment { near, far }
+        Segment { near: near.first(), far: far.first() }
     }
+
+    /// Four slabs of one axis.
+    #[inline(always)]
+    fn cut_four<T: Simd>(&self, [low, high]: [T::F4; 2], axis: usize, near: T::F4, far: T::F4) -> (T::F4, T::F4) {
+        let (first, last) = if self.backward[axis] { (high, low) } else { (low, high) };
+        let entry = first.mul_add_loose(T::F4::splat(self.entry.mul[axis]), T::F4::splat(self.entry.add[axis]));
+        let exit = last.mul_add_loose(T::F4::splat(self.exit.mul[axis]), T::F4::splat(self.exit.add[axis]));
+        (entry.max(near), exit.min(far))
+    }
+}
+
+#[inline(always)]
+fn is_open(segment: Segment<f32>) -> bool {
+    segment.near <= segment.far + SLACK
 }
 
 impl<S: Simd, const K: usize> Kernel<Wide<K>> for FastKernel<S> {
@@ -186,7 +196,8 @@ impl<S: Simd, const K: usize> Kernel<Wide<K>> for FastKernel<S> {
 
     #[inline(always)]
     fn test(&self, node: &Node<K>, mark: Segment<f32>, kids: &mut Segments<f32>) -> u32 {
-        cut_all(node, &self.entry, &self.exit, self.flips, mark, kids)
+        let (near, far) = cut_all::<S, _, K>(node, [&self.entry, &self.exit], self.flips, mark, kids);
+        (near - far).le(S::F8::splat(SLACK))
     }
 
     #[inline(always)]
@@ -202,25 +213,22 @@ impl<S: Simd, const K: usize> Kernel<Wide<K>> for FastKernel<S> {
     #[inline(always)]
     fn limit(&mut self, best: &Closest) {
         self.limit = best.t_cull();
-        self.cull = padded(self.limit);
     }
 
     #[inline(always)]
     fn reopened(&self, Segment { near, far }: Segment<f32>) -> Option<Segment<f32>> {
-        (near <= self.cull).then_some(Segment { near, far: if self.limit < far { self.limit } else { far } })
+        let segment = Segment { near, far: if self.limit < far { self.limit } else { far } };
+        is_open(segment).then_some(segment)
     }
 
     /// Planes that are inherited lead to leaves that the ray misses, and the triangles' boxes cost a third of the exact test.
     #[inline(always)]
     fn may_meet<T: Simd>(&self, block: &TriBlock, Segment { near, far }: Segment<f32>) -> bool {
         let (mut near, mut far) = (T::F4::splat(near), T::F4::splat(far));
-        for (axis, [low, high]) in block.boxes::<T>().into_iter().enumerate() {
-            let (first, last) = if self.backward[axis] { (high, low) } else { (low, high) };
-            let (origin, inv) = (T::F4::splat(self.origin[axis]), T::F4::splat(self.inv[axis]));
-            near = ((first - origin) * inv).max(near);
-            far = ((last - origin) * inv).min(far);
+        for (axis, planes) in block.boxes::<T>().into_iter().enumerate() {
+            (near, far) = self.cut_four::<T>(planes, axis, near, far);
         }
-        near.le(far.mul_add_loose(T::F4::splat(GROW), T::F4::splat(SLACK))) != 0
+        (near - far).le(T::F4::splat(SLACK)) != 0
     }
 }
 
@@ -328,9 +336,9 @@ impl<const K: usize, C: Counter, H: HitSink> Task for ClosestFrom<'_, K, C, H> {
     #[inline(always)]
     fn run<S: Simd>(self) {
         let Self { tree, start, ray, best, sink, count } = self;
-        let test = FastKernel::<S>::new(ray, best.t_cull());
+        let test = FastKernel::<S>::new(ray, tree.reach, best.t_cull());
         let start = start.unwrap_or_else(|| (Wide::<K>::root(), test.clipped(ray.range().t_near, &tree.bounds)));
-        if start.1.near <= padded(start.1.far) {
+        if is_open(start.1) {
             walk::closest::<S, _, _, C, H>(tree, test, start, ray, best, sink, count);
         }
     }
@@ -351,9 +359,9 @@ impl<const K: usize, C: Counter, H: HitSink> Task for OccludedFrom<'_, K, C, H> 
     #[inline(always)]
     fn run<S: Simd>(self) -> bool {
         let Self { tree, start, ray, sink, count } = self;
-        let test = FastKernel::<S>::new(ray, ray.range().t_far);
+        let test = FastKernel::<S>::new(ray, tree.reach, ray.range().t_far);
         let start = start.unwrap_or_else(|| (Wide::<K>::root(), test.clipped(ray.range().t_near, &tree.bounds)));
-        start.1.near <= padded(start.1.far) && walk::occluded::<S, _, _, C, H>(tree, &test, start, ray, sink, count)
+        is_open(start.1) && walk::occluded::<S, _, _, C, H>(tree, &test, start, ray, sink, count)
     }
 }
 
@@ -364,8 +372,8 @@ impl<const K: usize> Wide<K> {
 
     /// True when f32 node tests are proven for this ray and these planes.
     #[inline(always)]
-    pub(super) fn is_ordinary(&self, ray: &TravRay) -> bool {
-        ray.is_ordinary() && self.reach <= ORDINARY_MAX
+    pub(super) fn fits(&self, ray: &TravRay) -> bool {
+        slabs::fits(ray, self.reach)
     }
 
     #[inline(always)]
@@ -376,7 +384,7 @@ impl<const K: usize> Wide<K> {
         sink: &H,
         count: &mut C,
     ) {
-        if self.is_ordinary(ray) {
+        if self.fits(ray) {
             // Called, so that packets which fall apart share the code.
             S::call(ClosestFrom { tree: self, start: None, ray, best, sink, count });
         } else {
@@ -402,7 +410,7 @@ impl<const K: usize> Wide<K> {
         sink: &H,
         count: &mut C,
     ) -> bool {
-        if self.is_ordinary(ray) {
+        if self.fits(ray) {
             S::call(OccludedFrom { tree: self, start: None, ray, sink, count })
         } else {
             self.occluded_wide(ray, sink, count)
@@ -422,9 +430,9 @@ impl<const K: usize> Wide<K> {
 /// The children of a node that a ray meets, in f32 and in f64.
 #[cfg(test)]
 #[inline(always)]
-pub(super) fn met<S: Simd, const K: usize>(ray: &TravRay, node: &Node<K>) -> [u32; 2] {
+pub(super) fn met<S: Simd, const K: usize>(ray: &TravRay, node: &Node<K>, reach: f32) -> [u32; 2] {
     let t_far = ray.range().t_far;
-    let (fast, wide) = (FastKernel::<S>::new(ray, t_far), WideKernel::new(ray, f64::from(t_far)));
+    let (fast, wide) = (FastKernel::<S>::new(ray, reach, t_far), WideKernel::new(ray, f64::from(t_far)));
     let mut kids = Segments { near: [0.0; WIDTH], far: [0.0; WIDTH] };
     let mut wide_kids = Segments { near: [0.0; WIDTH], far: [0.0; WIDTH] };
     let (segment, wide_segment) =

@@ -2,8 +2,8 @@
 
 use super::{
     Wide,
-    kernel::{ClosestFrom, End, OccludedFrom, Segment, Segments, cut_all, flips},
-    node::{Node, Word},
+    kernel::{ClosestFrom, End, OccludedFrom, Segment, Segments, by_row, cut_all, flips, sides},
+    node::{FOURTH, Node, Word},
 };
 use crate::{
     accel::{
@@ -21,11 +21,43 @@ use crate::{
     simd::{Lanes, Simd},
 };
 
-/// All rays by their bounds, and each of them by its own planes.
+/// Relative slack between the entries and exits of all rays together: 8 * 2^-24, for three roundings of each.
+const GROW: f32 = 1.0 + 8.0 / 16_777_216.0;
+
+/// `(plane - origin) * inv` of the first or the last ray to pass a plane.
+#[derive(Clone, Copy)]
+struct Bound<S: Simd> {
+    origin: [f32; 3],
+    inv: [f32; 3],
+    row_origin: S::F8,
+    row_inv: S::F8,
+}
+
+impl<S: Simd> Bound<S> {
+    #[inline(always)]
+    fn new(origin: [f32; 3], inv: [f32; 3], sides: [usize; 3]) -> Self {
+        Self { origin, inv, row_origin: by_row::<S>(origin, sides), row_inv: by_row::<S>(inv, sides) }
+    }
+}
+
+impl<S: Simd> End<S> for Bound<S> {
+    #[inline(always)]
+    fn at(&self, planes: S::F8, axis: usize) -> S::F8 {
+        (planes - S::F8::splat(self.origin[axis])) * S::F8::splat(self.inv[axis])
+    }
+
+    #[inline(always)]
+    fn at_row(&self, planes: S::F8, words: S::U8) -> S::F8 {
+        (planes - S::picked::<FOURTH>(self.row_origin, words)) * S::picked::<FOURTH>(self.row_inv, words)
+    }
+}
+
+/// All rays by their bounds, and each of them by its own planes: [`Spread::ends`](crate::accel::wide::packet::Spread::ends) has the proof
+/// of the first, and that of the second is at the packets of the paper's form.
 struct Packet<S: Simd> {
     slabs: PacketSlabs<S>,
-    entry: End<S>,
-    exit: End<S>,
+    entry: Bound<S>,
+    exit: Bound<S>,
     flips: u32,
 }
 
@@ -41,8 +73,8 @@ impl<S: Simd> Packet<S> {
         let [[entry_origin, entry_inv], [exit_origin, exit_inv]] = ends;
         Self {
             slabs: PacketSlabs::new(packet, backward),
-            entry: End::new(entry_origin, entry_inv, backward, false),
-            exit: End::new(exit_origin, exit_inv, backward, true),
+            entry: Bound::new(entry_origin, entry_inv, sides(backward, false)),
+            exit: Bound::new(exit_origin, exit_inv, sides(backward, true)),
             flips: flips(backward),
         }
     }
@@ -69,7 +101,8 @@ impl<S: Simd, const K: usize> Together<S, Wide<K>> for Packet<S> {
 
     #[inline(always)]
     fn all(&self, node: &Node<K>, mark: Segment<f32>, kids: &mut Segments<f32>) -> u32 {
-        cut_all(node, &self.entry, &self.exit, self.flips, mark, kids)
+        let (near, far) = cut_all::<S, _, K>(node, [&self.entry, &self.exit], self.flips, mark, kids);
+        near.le(far.mul_add_loose(S::F8::splat(GROW), S::F8::splat(SLACK)))
     }
 
     #[inline(always)]
@@ -144,7 +177,7 @@ impl<const K: usize> Wide<K> {
         for (start, end, mut left) in packet::lanes::<S>(rays.len(), active) {
             let (rays, best, sinks) = (&rays[start..end], &mut best[start..end], &sinks[start..end]);
             while left != 0 {
-                let (members, backward) = packet::group(|ray| self.is_ordinary(ray), rays, left);
+                let (members, backward) = packet::group(|ray| self.fits(ray), rays, left);
                 left &= !members;
                 if members.count_ones() > FEW {
                     self.closest_together::<S, C, H>(rays, members, backward, best, sinks, count);
@@ -204,7 +237,7 @@ impl<const K: usize> Wide<K> {
         for (start, end, mut left) in packet::lanes::<S>(rays.len(), active) {
             let (rays, sinks) = (&rays[start..end], &sinks[start..end]);
             while left != 0 {
-                let (members, backward) = packet::group(|ray| self.is_ordinary(ray), rays, left);
+                let (members, backward) = packet::group(|ray| self.fits(ray), rays, left);
                 left &= !members;
                 if members.count_ones() > FEW {
                     let packet = PacketRays::new(rays, self.reach);

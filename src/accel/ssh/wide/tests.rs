@@ -7,7 +7,7 @@ use super::{
     packet::met_together,
 };
 use crate::{
-    accel::{TravRay, ssh::choose::size, wide::WIDTH},
+    accel::{TravRay, slabs, ssh::choose::size, wide::WIDTH},
     geom::{Aabb, Ray},
     simd::{Simd, SimdLevel, Task, dispatch},
 };
@@ -15,6 +15,7 @@ use crate::{
 struct Met<'a, const K: usize> {
     ray: &'a TravRay,
     node: &'a Node<K>,
+    reach: f32,
 }
 
 impl<const K: usize> Task for Met<'_, K> {
@@ -22,7 +23,7 @@ impl<const K: usize> Task for Met<'_, K> {
 
     #[inline(always)]
     fn run<S: Simd>(self) -> [u32; 4] {
-        let [fast, wide] = met::<S, K>(self.ray, self.node);
+        let [fast, wide] = met::<S, K>(self.ray, self.node, self.reach);
         let [all, each] = met_together::<S, K>(self.ray, self.node);
         [fast, wide, all, each]
     }
@@ -54,16 +55,16 @@ fn rays_are_cut_by_the_planes_that_are_kept() {
     let above = TravRay::new(&Ray::new(Vec3::new(-5.0, 0.5, 1.5), Vec3::X)).unwrap();
     for level in SimdLevel::available() {
         let (three, four) = (node::<3>(&unit, &inherited), node::<4>(&unit, &inherited));
-        assert_eq!(dispatch(level, Met { ray: &below, node: &three }), [HALF; 4], "{level}");
-        assert_eq!(dispatch(level, Met { ray: &above, node: &three }), [0; 4], "{level}");
-        assert_eq!(dispatch(level, Met { ray: &above, node: &four }), [0; 4], "{level}");
+        assert_eq!(dispatch(level, Met { ray: &below, node: &three, reach: 8.0 }), [HALF; 4], "{level}");
+        assert_eq!(dispatch(level, Met { ray: &above, node: &three, reach: 8.0 }), [0; 4], "{level}");
+        assert_eq!(dispatch(level, Met { ray: &above, node: &four, reach: 8.0 }), [0; 4], "{level}");
     }
     // Space on both sides of z: four planes keep both.
     let inherited = [grown(unit, Vec3::Z, Vec3::Z); 4];
     for level in SimdLevel::available() {
         let four = node::<4>(&unit, &inherited);
-        assert_eq!(dispatch(level, Met { ray: &below, node: &four }), [0; 4], "{level}");
-        assert_eq!(dispatch(level, Met { ray: &above, node: &four }), [0; 4], "{level}");
+        assert_eq!(dispatch(level, Met { ray: &below, node: &four, reach: 8.0 }), [0; 4], "{level}");
+        assert_eq!(dispatch(level, Met { ray: &above, node: &four, reach: 8.0 }), [0; 4], "{level}");
     }
 }
 
@@ -88,10 +89,12 @@ proptest! {
             grown(aabb, Vec3::new(a, b, c), Vec3::new(d, e, f))
         });
         let ray = TravRay::new(&Ray { t_far: f32::from(t), ..Ray::new(origin, dir) }).unwrap();
+        let reach = aabb.reach();
+        prop_assume!(slabs::fits(&ray, reach));
         for level in SimdLevel::available() {
-            let three = dispatch(level, Met { ray: &ray, node: &node::<3>(&aabb, &inherited) });
+            let three = dispatch(level, Met { ray: &ray, node: &node::<3>(&aabb, &inherited), reach });
             prop_assert_eq!(three, [HALF; 4], "{}", level);
-            let four = dispatch(level, Met { ray: &ray, node: &node::<4>(&aabb, &inherited) });
+            let four = dispatch(level, Met { ray: &ray, node: &node::<4>(&aabb, &inherited), reach });
             prop_assert_eq!(four, [HALF; 4], "{}", level);
         }
     }
