@@ -67,7 +67,7 @@ fn rays_at(mesh: &Mesh, first: usize, len: usize) -> Vec<Ray> {
 #[test]
 fn h05_needles_are_answered_exactly_and_triangles_without_area_never_hit() {
     let mesh = needles(count(20_000, 4_000, 400));
-    let total = count(1_000_000, 20_000, 100);
+    let total = count(200_000, 10_000, 100);
     let trial = Trial { name: "H5, needles", mesh: &mesh, rays: total, refitted: true };
     trial.run(|first, len| rays_at(&mesh, first, len));
     let rays = rays_at(&mesh, 0, total.min(50_000));
@@ -83,6 +83,6 @@ fn h05_needles_are_answered_exactly_and_triangles_without_area_never_hit() {
 #[test]
 fn h05_a_fan_of_slivers_is_answered_exactly() {
     let mesh = fan(count(10_000, 10_000, 500) as u32);
-    let trial = Trial { name: "H5, fan", mesh: &mesh, rays: count(5_000, 100, 20), refitted: true };
+    let trial = Trial { name: "H5, fan", mesh: &mesh, rays: count(2_000, 60, 20), refitted: true };
     trial.run(|first, len| rays_at(&mesh, first, len));
 }

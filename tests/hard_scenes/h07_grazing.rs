@@ -73,7 +73,7 @@ fn h07_grazing_rays_are_answered_exactly() {
     for k in 1..=7 {
         let angle = 1.0 / libm::exp10(f64::from(k));
         let name = format!("H7, 10^-{k} rad");
-        let trial = Trial { name: &name, mesh: &mesh, rays: count(300_000, 4_000, 30), refitted: true };
+        let trial = Trial { name: &name, mesh: &mesh, rays: count(50_000, 3_000, 30), refitted: true };
         trial.run(|first, len| grazing(angle, first, len));
     }
 }

@@ -193,7 +193,7 @@ fn count_secondary(world: &World, placed: &DMat4, seed: u64, len: usize) -> Coun
 
 #[test]
 fn h08_no_secondary_ray_meets_its_own_surface_or_passes_a_wall() {
-    let len = count(100_000, 3_000, 60);
+    let len = count(50_000, 2_000, 60);
     let mut sum = Counts::default();
     for (number, scale) in SCALES.into_iter().enumerate() {
         for (name, placement) in placements() {
