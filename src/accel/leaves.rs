@@ -16,7 +16,7 @@ use super::{
 };
 use crate::{
     geom::{Aabb, Triangles, exact::RayRange},
-    simd::Simd,
+    simd::{Scalar, Simd},
 };
 
 /// Tests the units that a walk comes upon.
@@ -27,6 +27,74 @@ pub(super) trait Leaves {
     fn t_cull(&self) -> f32;
     /// Tests a run of units. True ends the walk.
     fn leaf<C: Counter>(&mut self, units: Range<usize>, count: &mut C) -> bool;
+    /// The same for walks that few rays need.
+    fn rare(&mut self) -> &mut dyn RareLeaves;
+}
+
+/// [`Leaves`] by pointer and without SIMD, so that a walk that few rays need is compiled once.
+pub(super) trait RareLeaves {
+    /// [`Leaves::t_limit`] and [`Leaves::t_cull`].
+    fn limits(&self) -> (f64, f32);
+    /// As [`Leaves::leaf`].
+    fn test(&mut self, units: Range<usize>, count: &mut dyn Counter) -> bool;
+}
+
+impl<L: Leaves> RareLeaves for L {
+    fn limits(&self) -> (f64, f32) {
+        (self.t_limit(), self.t_cull())
+    }
+
+    fn test(&mut self, units: Range<usize>, count: &mut dyn Counter) -> bool {
+        self.leaf(units, &mut RareCounter(count))
+    }
+}
+
+/// A counter by pointer.
+pub(super) struct RareCounter<'a>(pub(super) &'a mut dyn Counter);
+
+impl Counter for RareCounter<'_> {
+    fn node(&mut self) {
+        self.0.node();
+    }
+    fn prim(&mut self) {
+        self.0.prim();
+    }
+    fn block(&mut self) {
+        self.0.block();
+    }
+    fn step(&mut self) {
+        self.0.step();
+    }
+    fn event(&mut self) {
+        self.0.event();
+    }
+    fn skip(&mut self) {
+        self.0.skip();
+    }
+    fn read(&mut self, address: usize, bytes: usize) {
+        self.0.read(address, bytes);
+    }
+}
+
+/// Leaves by pointer, for walks that are generic over them.
+pub(super) struct ByPointer<'a>(pub(super) &'a mut dyn RareLeaves);
+
+impl Leaves for ByPointer<'_> {
+    fn t_limit(&self) -> f64 {
+        self.0.limits().0
+    }
+
+    fn t_cull(&self) -> f32 {
+        self.0.limits().1
+    }
+
+    fn leaf<C: Counter>(&mut self, units: Range<usize>, count: &mut C) -> bool {
+        self.0.test(units, count)
+    }
+
+    fn rare(&mut self) -> &mut dyn RareLeaves {
+        self.0
+    }
 }
 
 /// Single objects, left to a [`Visitor`].
@@ -55,6 +123,10 @@ impl<V: Visitor> Leaves for Objects<'_, V> {
             }
         }
         false
+    }
+
+    fn rare(&mut self) -> &mut dyn RareLeaves {
+        self
     }
 }
 
@@ -103,21 +175,42 @@ impl<S: Simd, K: HitSink> Leaves for ClosestLeaves<'_, S, K> {
         }
         false
     }
+
+    fn rare(&mut self) -> &mut dyn RareLeaves {
+        &mut self.0
+    }
 }
 
-/// As [`ClosestLeaves`], for any hit.
-pub(super) struct OccludedLeaves<'a, S, K> {
+impl<K: HitSink> RareLeaves for ClosestBlocks<'_, K> {
+    fn limits(&self) -> (f64, f32) {
+        (self.best.t_high(), self.best.t_cull())
+    }
+
+    fn test(&mut self, units: Range<usize>, count: &mut dyn Counter) -> bool {
+        let Self { blocks, ray, block_ray, best, sink } = self;
+        for block in &blocks[units] {
+            block.closest::<Scalar, _, K>(ray, block_ray, best, sink, &mut RareCounter(count));
+        }
+        false
+    }
+}
+
+/// Blocks of triangles, for any hit.
+pub(super) struct OccludedBlocks<'a, K> {
     blocks: &'a [TriBlock],
     ray: &'a TravRay,
     block_ray: BlockRay,
     sink: &'a K,
-    level: std::marker::PhantomData<S>,
 }
+
+/// [`OccludedBlocks`] at one SIMD level.
+pub(super) struct OccludedLeaves<'a, S, K>(OccludedBlocks<'a, K>, std::marker::PhantomData<S>);
 
 impl<'a, S, K> OccludedLeaves<'a, S, K> {
     #[inline(always)]
     pub(super) fn new(blocks: &'a [TriBlock], reach: f32, ray: &'a TravRay, sink: &'a K) -> Self {
-        Self { blocks, ray, block_ray: BlockRay::new(ray, reach), sink, level: std::marker::PhantomData }
+        let block_ray = BlockRay::new(ray, reach);
+        Self(OccludedBlocks { blocks, ray, block_ray, sink }, std::marker::PhantomData)
     }
 }
 
@@ -129,17 +222,35 @@ impl<S: Simd, K: HitSink> Leaves for OccludedLeaves<'_, S, K> {
 
     #[inline(always)]
     fn t_cull(&self) -> f32 {
-        self.ray.range().t_far
+        self.0.ray.range().t_far
     }
 
     #[inline(always)]
     fn leaf<C: Counter>(&mut self, units: Range<usize>, count: &mut C) -> bool {
-        for block in &self.blocks[units] {
-            if block.occluded::<S, C, K>(self.ray, &self.block_ray, self.sink, count) {
+        let OccludedBlocks { blocks, ray, block_ray, sink } = &self.0;
+        for block in &blocks[units] {
+            if block.occluded::<S, C, K>(ray, block_ray, *sink, count) {
                 return true;
             }
         }
         false
+    }
+
+    fn rare(&mut self) -> &mut dyn RareLeaves {
+        &mut self.0
+    }
+}
+
+impl<K: HitSink> RareLeaves for OccludedBlocks<'_, K> {
+    fn limits(&self) -> (f64, f32) {
+        let t_far = self.ray.range().t_far;
+        (f64::from(t_far), t_far)
+    }
+
+    fn test(&mut self, units: Range<usize>, count: &mut dyn Counter) -> bool {
+        let Self { blocks, ray, block_ray, sink } = self;
+        let mut count = RareCounter(count);
+        blocks[units].iter().any(|block| block.occluded::<Scalar, _, K>(ray, block_ray, *sink, &mut count))
     }
 }
 

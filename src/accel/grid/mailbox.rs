@@ -3,7 +3,12 @@
 use std::ops::Range;
 
 use crate::{
-    accel::{Closest, Counter, HitSink, TravRay, block::NO_PRIM, leaves::Leaves, query::is_blocked_by},
+    accel::{
+        Closest, Counter, HitSink, TravRay,
+        block::NO_PRIM,
+        leaves::{Leaves, RareLeaves},
+        query::is_blocked_by,
+    },
     geom::{PrimId, Triangles},
 };
 
@@ -73,6 +78,10 @@ impl<K: HitSink> Leaves for MailedClosest<'_, K> {
         }
         false
     }
+
+    fn rare(&mut self) -> &mut dyn RareLeaves {
+        self
+    }
 }
 
 /// For any hit.
@@ -114,5 +123,9 @@ impl<K: HitSink> Leaves for MailedOccluded<'_, K> {
             }
         }
         false
+    }
+
+    fn rare(&mut self) -> &mut dyn RareLeaves {
+        self
     }
 }

@@ -22,7 +22,7 @@ use super::{
     Accel, AccelConfig, AccelStats, BuildError, Closest, Counter, HitSink, Refit, TravRay, Violation, Visitor,
     block::TriBlock,
     check_indices,
-    leaves::{ClosestLeaves, Leaves, Line, Objects, OccludedLeaves, pack},
+    leaves::{ClosestLeaves, Leaves, Line, Objects, OccludedLeaves, RareLeaves, pack},
     sah::BLOCK,
     shapes::Shapes,
 };
@@ -151,7 +151,7 @@ impl Cells {
         let line = Line::new(ray.range());
         let Some(interval) = line.clip_to(&self.bounds, leaves.t_limit()) else { return false };
         if !self.lattice.is_near(&line) {
-            return self.walk_far(&line, interval, leaves, count);
+            return self.walk_far(&line, interval, leaves.rare(), count);
         }
         let mut dda = Dda::new(&self.lattice, &line, interval.0);
         let (mut cell, strides) = (number(&self.lattice, dda.cell), self.strides(&line));
@@ -179,16 +179,16 @@ impl Cells {
     /// For rays from so far away that planes of cells cannot be told apart in f64.
     #[cold]
     #[inline(never)]
-    fn walk_far<L: Leaves, C: Counter>(
+    fn walk_far(
         &self,
         line: &Line,
         interval: (f64, f64),
-        leaves: &mut L,
-        count: &mut C,
+        leaves: &mut dyn RareLeaves,
+        count: &mut dyn Counter,
     ) -> bool {
         self.lattice.bisect(line, interval, &mut |cell, t0, _| {
             count.step();
-            t0 <= leaves.t_limit() && leaves.leaf(self.units(number(&self.lattice, cell)), count)
+            t0 <= leaves.limits().0 && leaves.test(self.units(number(&self.lattice, cell)), count)
         })
     }
 

@@ -9,7 +9,7 @@ use crate::accel::{
         node::KdNode,
         traverse::{self, Crossing, Fast, Wide},
     },
-    leaves::{Leaves, Line},
+    leaves::{ByPointer, Leaves, Line, RareCounter, RareLeaves},
 };
 
 /// Address that reads of the table are counted from; nodes are counted from 0.
@@ -23,19 +23,20 @@ impl Grug {
         if self.lattice.is_near(&line) && traverse::is_ordinary(ray, self.reach) {
             self.walk_groups(&line, interval, &Fast::new(ray), leaves, count)
         } else {
-            self.walk_wide(&line, interval, leaves, count)
+            self.walk_wide(&line, interval, leaves.rare(), count)
         }
     }
 
     #[cold]
     #[inline(never)]
-    fn walk_wide<L: Leaves, C: Counter>(
+    fn walk_wide(
         &self,
         line: &Line,
         interval: (f64, f64),
-        leaves: &mut L,
-        count: &mut C,
+        leaves: &mut dyn RareLeaves,
+        count: &mut dyn Counter,
     ) -> bool {
+        let (leaves, count) = (&mut ByPointer(leaves), &mut RareCounter(count));
         if self.lattice.is_near(line) {
             return self.walk_groups(line, interval, &Wide(line), leaves, count);
         }

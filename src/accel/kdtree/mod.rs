@@ -21,7 +21,7 @@ use super::{
     Accel, AccelConfig, AccelStats, BuildError, Closest, Counter, HitSink, Refit, TravRay, Violation, Visitor,
     block::TriBlock,
     check_indices,
-    leaves::{ClosestLeaves, Leaves, Line, Objects, OccludedLeaves, pack},
+    leaves::{ByPointer, ClosestLeaves, Leaves, Line, Objects, OccludedLeaves, RareCounter, RareLeaves, pack},
     sah::{BLOCK, half_area},
     shapes::Shapes,
 };
@@ -128,20 +128,20 @@ impl Tree {
         if traverse::is_ordinary(ray, self.reach) {
             traverse::walk(&self.nodes, 0, traverse::outward(interval), &Fast::new(ray), leaves, count)
         } else {
-            self.walk_wide(&line, interval, leaves, count)
+            self.walk_wide(&line, interval, leaves.rare(), count)
         }
     }
 
     #[cold]
     #[inline(never)]
-    fn walk_wide<L: Leaves, C: Counter>(
+    fn walk_wide(
         &self,
         line: &Line,
         interval: (f64, f64),
-        leaves: &mut L,
-        count: &mut C,
+        leaves: &mut dyn RareLeaves,
+        count: &mut dyn Counter,
     ) -> bool {
-        traverse::walk(&self.nodes, 0, interval, &Wide(line), leaves, count)
+        traverse::walk(&self.nodes, 0, interval, &Wide(line), &mut ByPointer(leaves), &mut RareCounter(count))
     }
 
     fn stats(&self, unit_cost: f64) -> AccelStats {
