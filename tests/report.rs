@@ -135,6 +135,7 @@ fn counts_are_the_same_in_every_run_and_a_worse_count_fails_the_check() {
 }
 
 #[test]
+#[cfg_attr(debug_assertions, ignore = "takes minutes without optimisation")]
 fn accuracy_sets_speed_against_error_and_conservative_points_err_never() {
     let dir = tempfile::tempdir().expect("a folder");
     let (mesh, out) = (mesh(dir.path()), dir.path().join("out"));
