@@ -110,15 +110,15 @@ pub(super) fn of_pair<S: Simd>(ray: &TravRay, reach: f32) -> ([S::F4; 3], [S::F4
     let (ends, pad) = (S::F4::load(&ends), S::F4::splat(pad));
     let mut mul = [ends; 3];
     let mut add = [ends; 3];
-    for axis in 0..3 {
+    for (axis, (mul, add)) in mul.iter_mut().zip(&mut add).enumerate() {
         let (mut inv, mut raise) = (inv[axis], 0.0);
         if range.dir[axis] == 0.0 {
             let size = range.dir.abs().max_element();
             (inv, raise) = (STEEP / size, (ray.far() + reach) * 1.001 / size);
         }
-        mul[axis] = S::F4::splat(inv) * ends;
-        let place = S::F4::splat(range.origin[axis]) * mul[axis];
-        add[axis] = -(place + place.abs() * pad) + S::F4::load(&[0.0, 0.0, -raise, -raise]);
+        *mul = S::F4::splat(inv) * ends;
+        let place = S::F4::splat(range.origin[axis]) * *mul;
+        *add = -(place + place.abs() * pad) + S::F4::load(&[0.0, 0.0, -raise, -raise]);
     }
     (mul, add)
 }
@@ -166,7 +166,7 @@ mod tests {
             let splat3 = |v: [f32; 3]| v.map(S::F::splat);
             let extent = Extent::new(splat3(origin), splat3(dir), self.reach);
             let mut out = [[0.0; 4]; 3];
-            for axis in 0..3 {
+            for (axis, out) in out.iter_mut().enumerate() {
                 let (mut row, mut rows) = ([0.0; 4], [[0.0; 16]; 2]);
                 S::F4::splat(self.planes[axis]).mul_add_loose(mul[axis], add[axis]).store(&mut row);
                 let plane = S::F::splat(self.planes[axis]);
@@ -174,7 +174,7 @@ mod tests {
                 let slab = Slab::new(S::F::splat(origin[axis]), S::F::splat(dir[axis]), &extent, nodes);
                 plane.mul_add_loose(slab.entry_mul, slab.entry_add).store(&mut rows[0]);
                 plane.mul_add_loose(slab.exit_mul, slab.exit_add).store(&mut rows[1]);
-                out[axis] = [row[0], -row[2], rows[0][0], rows[1][0]];
+                *out = [row[0], -row[2], rows[0][0], rows[1][0]];
             }
             out
         }
