@@ -161,12 +161,12 @@ fn print(c: &Counts) {
 }
 
 /// The records of a file of `count` records of `size` bytes behind a magic word.
-fn records(file: &str, magic: &[u8; 4], size: usize) -> Result<Vec<u8>, String> {
+fn records(file: &str, magic: [u8; 4], size: usize) -> Result<Vec<u8>, String> {
     let bytes = fs::read(file).map_err(|e| format!("{file}: {e}"))?;
     let (head, body) = bytes.split_at_checked(8).ok_or_else(|| format!("{file}: no header"))?;
     let count = u32::from_le_bytes([head[4], head[5], head[6], head[7]]) as usize;
     if head[..4] != magic[..] || body.len() != count * size {
-        return Err(format!("{file}: not {count} records of {}", String::from_utf8_lossy(magic)));
+        return Err(format!("{file}: not {count} records of {}", String::from_utf8_lossy(&magic)));
     }
     Ok(body.to_vec())
 }
@@ -184,26 +184,26 @@ fn vec3(record: &[u8], i: usize) -> Vec3 {
 }
 
 fn read_tris(file: &str) -> Result<(Vec<Vec3>, Vec<[u32; 3]>), String> {
-    let body = records(file, b"TRI1", 36)?;
+    let body = records(file, *b"TRI1", 36)?;
     let positions: Vec<Vec3> = body.chunks_exact(12).map(|r| vec3(r, 0)).collect();
     let count = u32::try_from(positions.len() / 3).map_err(|e| e.to_string())?;
     Ok((positions, (0..count).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect()))
 }
 
 fn read_rays(file: &str) -> Result<Vec<Ray>, String> {
-    let body = records(file, b"RAY1", 32)?;
+    let body = records(file, *b"RAY1", 32)?;
     let ray = |r: &[u8]| Ray { origin: vec3(r, 0), t_near: float(r, 3), dir: vec3(r, 4), t_far: float(r, 7) };
     Ok(body.chunks_exact(32).map(ray).collect())
 }
 
 fn read_oracle(file: &str) -> Result<Vec<Oracle>, String> {
-    let body = records(file, b"ORC1", 40)?;
+    let body = records(file, *b"ORC1", 40)?;
     let t = |r: &[u8]| f64::from_bits(u64::from(word(r, 2)) | u64::from(word(r, 3)) << 32);
     Ok(body.chunks_exact(40).map(|r| Oracle { ray: word(r, 0) as usize, prim: word(r, 1), t: t(r) }).collect())
 }
 
 fn read_hits(file: &str) -> Result<Vec<Option<Hit>>, String> {
-    let body = records(file, b"HIT1", 16)?;
+    let body = records(file, *b"HIT1", 16)?;
     let hit = |r: &[u8]| Hit {
         t: float(r, 1),
         u: float(r, 2),

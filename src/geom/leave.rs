@@ -25,7 +25,7 @@ pub(crate) const INWARD: f32 = 16.0;
 /// The start lies strictly on the side of the triangle's plane that `dir` leads to, in exact arithmetic (on the side where
 /// the corners run counterclockwise when `dir` is parallel to it): with `t` from 0 on, the ray does not meet the triangle
 /// again. It lies a few units in the last place from the surface, by the error of the point, whatever the scale; near an
-/// edge it is drawn inwards by [some 16](INWARD) times as much, so that it does not start behind a wall that meets the
+/// edge it is drawn inwards by some 16 times as much, so that it does not start behind a wall that meets the
 /// triangle there at more than 10 degrees. Hits are decided on world-space vertices, so `corners` are those of
 /// [`crate::world::World::corners`] and nothing depends on how an instance is scaled or sheared.
 ///

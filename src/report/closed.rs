@@ -220,10 +220,8 @@ impl Closed {
         let corner = below(3, random);
         let corners = prims.corners(prim).map(Vec3::as_dvec3);
         let (a, b) = (corners[corner], corners[(corner + 1) % 3]);
-        let mut origin = match outside {
-            true => snapped(direction(random) * (1.5 + 0.4 * random.unit())),
-            false => self.inner(random),
-        };
+        let mut origin =
+            if outside { snapped(direction(random) * (1.5 + 0.4 * random.unit())) } else { self.inner(random) };
         let share = match aim {
             Aim::Corners => 0.0,
             Aim::Middles => 0.5,

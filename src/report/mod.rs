@@ -2,7 +2,7 @@
 //!
 //! A [`Report`] holds rows of [`Table`]s, [`Check`]s and [`Plot`]s; [`Report::write`] puts them into a folder as JSON, Markdown and SVG.
 //! [`structures`] measures every acceleration structure on scenes and on meshes of growing size; [`papers`] puts the tables of three
-//! papers beside ours; [`accuracy`] sets speed against error. [`reference`] holds the right answers that errors are measured by.
+//! papers beside ours; [`accuracy`] sets speed against error. [`mod@reference`] holds the right answers that errors are measured by.
 
 pub mod accuracy;
 pub mod baseline;

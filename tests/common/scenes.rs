@@ -128,7 +128,7 @@ impl Maker {
         }
         self.scene.eval_order.clone_from(&order);
         self.scene.draw_order = order;
-        self.scene.file = "made.gltf".to_owned();
+        "made.gltf".clone_into(&mut self.scene.file);
         self.scene.scene_count = 1;
         self.scene
     }

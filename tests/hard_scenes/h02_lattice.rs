@@ -26,7 +26,7 @@ fn tiny_rays(n: usize, first: usize, len: usize) -> Vec<Ray> {
             dir = dir.signum();
         }
         let axis = random.below(3);
-        for k in 0..1 + random.below(2) {
+        for k in 0..=random.below(2) {
             dir[(axis + k) % 3] = TINY[random.below(TINY.len())];
         }
         let mut origin = (random.vec3() + 1.0) * (n as f32 * 0.6) - 0.2;

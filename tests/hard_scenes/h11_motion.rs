@@ -8,7 +8,7 @@ use kinora::{
     accel::{AccelKind, AccelSpec, Refit},
     anim::{ActiveClip, loop_time},
     dynamics::{FrameConfig, FrameLoop, RebuildPolicy},
-    geom::{Hit, InstanceId, Ray},
+    geom::{Forms, Hit, InstanceId, Ray},
     glam::Vec3,
     render::{CameraView, Film, RenderSettings, Renderer},
     report::reference::Reference,
@@ -100,7 +100,7 @@ const DURATION_S: f64 = 4.0;
 
 fn frame_loop(scene: &Arc<Scene>, accel: &str, policy: RebuildPolicy) -> FrameLoop {
     let pool = Arc::new(rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a pool"));
-    let config = FrameConfig { accel: accel.into(), top: "bvh2".into(), policy, forms: Default::default(), pool };
+    let config = FrameConfig { accel: accel.into(), top: "bvh2".into(), policy, forms: Forms::default(), pool };
     let mut frames = FrameLoop::new(config).expect("a known structure");
     frames.add(scene.clone(), DAffine3::IDENTITY);
     frames
@@ -142,11 +142,14 @@ fn picture(world: &World) -> Vec<u8> {
 const POLICIES: [RebuildPolicy; 4] =
     [RebuildPolicy::Refit, RebuildPolicy::Rebuild, RebuildPolicy::Async, RebuildPolicy::SwapEvery(3)];
 
+/// Positions as bits, hits and pixels of a frame.
+type Seen = (Vec<[u32; 3]>, Vec<Option<Hit>>, Vec<u8>);
+
 #[test]
 fn h11_no_bound_is_violated_and_what_returns_is_the_same() {
     for (name, scene) in motions() {
         let scene = Arc::new(scene);
-        let mut due: Option<(Vec<[u32; 3]>, Vec<Option<Hit>>, Vec<u8>)> = None;
+        let mut due: Option<Seen> = None;
         for &kind in AccelKind::ALL {
             for policy in POLICIES {
                 let mut frames = frame_loop(&scene, kind.name(), policy);

@@ -101,7 +101,9 @@ fn color_difference(a: &Picture, b: &Picture) -> Vec<f64> {
         })
     });
     let sums: [f64; 3] = std::array::from_fn(|n| kernel.iter().map(|t| t.weights[n]).sum());
-    kernel.iter_mut().for_each(|t| t.weights = std::array::from_fn(|n| t.weights[n] / sums[n]));
+    for tap in &mut kernel {
+        tap.weights = std::array::from_fn(|n| tap.weights[n] / sums[n]);
+    }
     let seen = |p: &Picture| -> Vec<Triple> {
         p.filtered(&kernel).into_iter().map(|c| uniform(rgb(c).map(|x| x.clamp(0.0, 1.0)))).collect()
     };
@@ -126,7 +128,9 @@ fn feature_difference(a: &Picture, b: &Picture) -> Vec<f64> {
     for n in 0..4 {
         let sum = |sign: f64| -> f64 { kernel.iter().map(|t| (t.weights[n] * sign).max(0.0)).sum() };
         let (above, below) = (sum(1.0), sum(-1.0));
-        kernel.iter_mut().for_each(|t| t.weights[n] /= if t.weights[n] > 0.0 { above } else { below });
+        for tap in &mut kernel {
+            tap.weights[n] /= if tap.weights[n] > 0.0 { above } else { below };
+        }
     }
     let found = |p: &Picture| -> Vec<[f64; 2]> {
         let strength = |[ex, ey, px, py]: [f64; 4]| [libm::hypot(ex, ey), libm::hypot(px, py)];

@@ -100,7 +100,9 @@ pub(super) fn table(rows: &[ImageRow]) -> Table {
          that of Andersson et al. 2020 for displays at 67 pixels a degree, 0 to 1. Differing pixels: any bit of the linear colour. Times are wall-clock \
          times on all threads of the report.",
     );
-    rows.iter().for_each(|r| table.push(r.cells()));
+    for row in rows {
+        table.push(row.cells());
+    }
     table
 }
 

@@ -23,20 +23,20 @@ const COLUMNS: &[Column] = &[
 #[derive(Clone, Debug, PartialEq)]
 struct Value {
     name: &'static str,
-    value: f64,
+    number: f64,
     /// A rate is drawn at the upper end of its confidence interval.
     drawn: f64,
 }
 
 impl Value {
     fn new(name: &'static str, value: f64) -> Self {
-        Self { name, value, drawn: value }
+        Self { name, number: value, drawn: value }
     }
 
     /// Of `events` in `trials`, in 10^9.
     fn rate(name: &'static str, events: u64, trials: u64) -> Self {
-        let value = events as f64 * 1e9 / trials.max(1) as f64;
-        Self { name, value, drawn: wilson(events, trials).1 * 1e9 }
+        let number = events as f64 * 1e9 / trials.max(1) as f64;
+        Self { name, number, drawn: wilson(events, trials).1 * 1e9 }
     }
 }
 
@@ -152,21 +152,21 @@ impl<'a> Front<'a> {
                 front.errors.push(error);
             }
         }
-        let points = front.costs.iter().zip(&front.errors).map(|(c, e)| (c.value, e.value));
+        let points = front.costs.iter().zip(&front.errors).map(|(c, e)| (c.number, e.number));
         front.best = non_dominated(&points.collect::<Vec<_>>());
         front
     }
 
     /// Where every point errs alike there is nothing to see.
     fn is_telling(&self) -> bool {
-        let first = self.errors[0].value;
-        self.errors.iter().any(|e| e.value.total_cmp(&first).is_ne())
+        let first = self.errors[0].number;
+        self.errors.iter().any(|e| e.number.total_cmp(&first).is_ne())
     }
 
     fn plot(&self) -> Plot {
         let dots = (0..self.spots.len()).map(|i| Dot {
             name: self.spots[i].point.clone(),
-            at: (self.costs[i].value, self.errors[i].drawn),
+            at: (self.costs[i].number, self.errors[i].drawn),
             is_best: self.best[i],
             mark: usize::from(self.spots[i].forms != Forms::EXACT),
         });
@@ -197,8 +197,8 @@ pub(super) fn table(spots: &[Spot]) -> Table {
                 spot.point.clone().into(),
                 if spot.nodes.is_empty() { Cell::Absent } else { spot.nodes.into() },
                 label(spot.forms).into(),
-                front.costs[i].value.into(),
-                front.errors[i].value.into(),
+                front.costs[i].number.into(),
+                front.errors[i].number.into(),
                 Cell::Flag(front.best[i]),
             ]);
         }

@@ -154,7 +154,7 @@ fn edges(eye: Vec3, prims: &Triangles<'_>, count: usize) -> Vec<Ray> {
         let prim = PrimId((random.unit() * prims.len() as f64) as u32);
         let corners = prims.corners(prim).map(Vec3::as_dvec3);
         let side = (random.unit() * 3.0) as usize % 3;
-        let share = if i % 4 == 0 { 0.0 } else { random.unit() };
+        let share = if i.is_multiple_of(4) { 0.0 } else { random.unit() };
         let at = corners[side] + (corners[(side + 1) % 3] - corners[side]) * share;
         Ray::new(eye, (at - eye.as_dvec3()).as_vec3())
     };

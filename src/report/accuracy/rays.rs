@@ -162,7 +162,9 @@ pub(super) fn table(rows: &[RayRow]) -> Table {
              several met at the same t (a tie), each is right. A leak: a ray from inside a closed mesh that meets nothing. For shadow rays, false misses are leaks of light and \
              false hits are false shadows. Errors of t are relative, those of u and v absolute, in u = 2^-24; a correct rounding has at most 1.",
         );
-    rows.iter().for_each(|r| table.push(r.cells()));
+    for row in rows {
+        table.push(row.cells());
+    }
     table
 }
 

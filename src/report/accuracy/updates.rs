@@ -113,7 +113,9 @@ pub(super) fn table(rows: &[UpdateRow]) -> Table {
          first clip, or everything since it began; for meshes, a wave. Exact answers after each update are compared with those of a fresh build bit for bit, and judged. Structures that cannot \
          refit are built anew. Quality is the surface-area cost, and the nodes and triangles that rays visit, relative to a fresh build.",
     );
-    rows.iter().for_each(|r| table.push(r.cells()));
+    for row in rows {
+        table.push(row.cells());
+    }
     table
 }
 

@@ -212,6 +212,7 @@ fn dot(a: &Integers, b: &Integers) -> BigInt {
 }
 
 #[cfg(test)]
+#[allow(clippy::float_cmp, reason = "answers are compared bit for bit")]
 mod tests {
     use super::*;
 

@@ -160,6 +160,7 @@ pub fn wilson(events: u64, trials: u64) -> (f64, f64) {
 }
 
 #[cfg(test)]
+#[allow(clippy::float_cmp, reason = "answers are compared bit for bit")]
 mod tests {
     use super::{super::Accepted, *};
     use crate::geom::{InstanceId, PrimId};

@@ -269,6 +269,7 @@ impl Visit for Any {
 }
 
 #[cfg(test)]
+#[allow(clippy::float_cmp, reason = "answers are compared bit for bit")]
 mod tests {
     use super::*;
     use crate::report::{meshes, random::Random};
