@@ -43,11 +43,12 @@ impl FromStr for Precision {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct Forms {
     /// Boxes and slabs that a ray may meet. Fast: `plane * (1/d) - origin * (1/d)` in one fused operation of `f32`, neither end
-    /// widened, so a box that a ray touches at an edge, or that lies far from the origin for its size, may be lost. In `bvh2`; the
-    /// other structures have the exact form only.
+    /// widened, so a box that a ray touches at an edge, or that lies far from the origin for its size, may be lost. In `bvh2`, `bvh8` and
+    /// `ssh` with three or four planes a child; the other structures have the exact form only.
     pub nodes: Precision,
     /// Triangles that a ray may hit. Fast: Möller and Trumbore's test in `f32` without bounds, so a ray may slip through a shared edge,
-    /// hit a triangle that it passes by, or find the wrong one first; t, u and v are off by more than a rounding. In every structure over triangles.
+    /// hit a triangle that it passes by, or find the wrong one first; t, u and v are off by more than a rounding, and products of three coordinates
+    /// above some 10^12 overflow, which is a miss. In every structure over triangles.
     pub leaves: Precision,
     /// Vertices. Fast: morphed and skinned in `f32`, the joint matrices rounded.
     pub deform: Precision,
