@@ -30,8 +30,8 @@ struct Allowed {
 const ALLOWED: &[Allowed] = &[
     Allowed { name: "exact", forms: [EXACT, EXACT], ordinary: 0.0, aimed: 0.0, t: 1.0 },
     Allowed { name: "fast nodes", forms: [FAST, EXACT], ordinary: 1e-3, aimed: 0.05, t: 1.0 },
-    Allowed { name: "fast triangles", forms: [EXACT, FAST], ordinary: 1e-2, aimed: 0.5, t: 1e4 },
-    Allowed { name: "fast nodes, triangles", forms: [FAST, FAST], ordinary: 1e-2, aimed: 0.5, t: 1e4 },
+    Allowed { name: "fast triangles", forms: [EXACT, FAST], ordinary: 1e-2, aimed: 0.75, t: 1e4 },
+    Allowed { name: "fast nodes, triangles", forms: [FAST, FAST], ordinary: 1e-2, aimed: 0.75, t: 1e4 },
 ];
 
 const COLUMNS: &[Column] = &[
