@@ -12,6 +12,7 @@ pub mod grid;
 pub mod grug;
 pub mod kdtree;
 mod leaves;
+mod lineage;
 pub mod list;
 mod packet;
 mod query;

@@ -14,12 +14,12 @@ mod refit;
 mod traverse;
 mod validate;
 
-use std::sync::atomic::{AtomicU64, Ordering};
-
 use super::{
     Accel, AccelConfig, AccelStats, BuildError, Closest, Counter, HitSink, Refit, TravRay, Violation,
     block::TriBlock,
-    check_indices, sah,
+    check_indices,
+    lineage::{self, Lineage, Refittable},
+    sah,
     topology::{self, Cut, MAX_DEPTH, MAX_LEAF},
 };
 use crate::{
@@ -29,9 +29,6 @@ use crate::{
 use node::{Link, MAX_BLOCKS, Pair};
 use refit::Swept;
 
-/// Tells topologies apart: structures with equal numbers differ in boxes and corners only.
-static NEXT_TOPOLOGY: AtomicU64 = AtomicU64::new(0);
-
 /// A built hierarchy.
 #[derive(Debug)]
 pub struct Bvh2 {
@@ -40,13 +37,8 @@ pub struct Bvh2 {
     bounds: Aabb,
     /// Greatest absolute coordinate of the bounds.
     reach: f32,
-    topology: u64,
-    topology_epoch: u64,
-    prim_count: usize,
-    position_count: usize,
+    lineage: Lineage,
     swept: Swept,
-    /// Expected cost of a ray per own area of the triangles, right after the build.
-    fresh_cost: f64,
 }
 
 impl Clone for Bvh2 {
@@ -126,6 +118,16 @@ impl Bvh2 {
     }
 }
 
+impl Refittable for Bvh2 {
+    fn lineage(&self) -> &Lineage {
+        &self.lineage
+    }
+
+    fn retake(&mut self, prims: &Triangles<'_>) {
+        self.take_positions(prims);
+    }
+}
+
 impl Accel for Bvh2 {
     const NAME: &'static str = "bvh2";
     type Config = Bvh2Config;
@@ -140,30 +142,16 @@ impl Accel for Bvh2 {
             blocks: emitted.blocks,
             bounds: Aabb::EMPTY,
             reach: 0.0,
-            topology: NEXT_TOPOLOGY.fetch_add(1, Ordering::Relaxed),
-            topology_epoch: prims.topology_epoch,
-            prim_count: prims.len(),
-            position_count: prims.positions.len(),
+            lineage: Lineage::new(prims),
             swept: Swept::default(),
-            fresh_cost: 0.0,
         };
         out.take_positions(prims);
-        out.fresh_cost = out.cost();
+        out.lineage.set_fresh_cost(out.cost());
         Ok(out)
     }
 
     fn refit_into(&self, out: &mut Self, prims: &Triangles<'_>) -> Refit {
-        let same = prims.topology_epoch == self.topology_epoch
-            && prims.len() == self.prim_count
-            && prims.positions.len() == self.position_count;
-        if !same {
-            return Refit::NeedsRebuild;
-        }
-        if out.topology != self.topology {
-            out.clone_from(self);
-        }
-        out.take_positions(prims);
-        Refit::Done
+        lineage::refit_into(self, out, prims)
     }
 
     #[inline(always)]
@@ -237,6 +225,6 @@ impl Accel for Bvh2 {
     }
 
     fn decay(&self) -> f64 {
-        if self.fresh_cost > 0.0 { self.cost() / self.fresh_cost } else { 1.0 }
+        self.lineage.decay(self.cost())
     }
 }

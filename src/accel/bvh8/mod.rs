@@ -15,12 +15,12 @@ mod node;
 mod packet;
 mod validate;
 
-use std::sync::atomic::{AtomicU64, Ordering};
-
 use super::{
     Accel, AccelConfig, AccelStats, BuildError, Closest, Counter, HitSink, Refit, TravRay, Violation,
     block::TriBlock,
-    check_indices, sah,
+    check_indices,
+    lineage::{self, Lineage, Refittable},
+    sah,
     topology::{self, Child, Cut, wide::collapse},
     wide::{
         Place, Tree, WIDTH,
@@ -33,9 +33,6 @@ use crate::{
 };
 use node::{Link, MAX_BLOCKS, Node};
 
-/// Tells topologies apart: structures with equal numbers differ in boxes and corners only.
-static NEXT_TOPOLOGY: AtomicU64 = AtomicU64::new(0);
-
 /// A built hierarchy.
 #[derive(Debug)]
 pub struct Bvh8 {
@@ -44,15 +41,10 @@ pub struct Bvh8 {
     bounds: Aabb,
     /// Greatest absolute coordinate of the bounds.
     reach: f32,
-    topology: u64,
-    topology_epoch: u64,
-    prim_count: usize,
-    position_count: usize,
+    lineage: Lineage,
     /// Sums of half areas: of nodes and leaves times the cost of a visit, and of the triangles' own boxes.
     cost: f64,
     own_area: f64,
-    /// Expected cost of a ray per own area of the triangles, right after the build.
-    fresh_cost: f64,
 }
 
 impl Clone for Bvh8 {
@@ -184,6 +176,16 @@ impl Bvh8 {
     }
 }
 
+impl Refittable for Bvh8 {
+    fn lineage(&self) -> &Lineage {
+        &self.lineage
+    }
+
+    fn retake(&mut self, prims: &Triangles<'_>) {
+        self.take_positions(prims);
+    }
+}
+
 impl Accel for Bvh8 {
     const NAME: &'static str = "bvh8";
     type Config = Bvh8Config;
@@ -198,32 +200,18 @@ impl Accel for Bvh8 {
             blocks: Vec::new(),
             bounds: Aabb::EMPTY,
             reach: 0.0,
-            topology: NEXT_TOPOLOGY.fetch_add(1, Ordering::Relaxed),
-            topology_epoch: prims.topology_epoch,
-            prim_count: prims.len(),
-            position_count: prims.positions.len(),
+            lineage: Lineage::new(prims),
             cost: 0.0,
             own_area: 0.0,
-            fresh_cost: 0.0,
         };
         out.emit(&collapse(&binary, prims), &binary.prims);
         out.take_positions(prims);
-        out.fresh_cost = out.relative_cost();
+        out.lineage.set_fresh_cost(out.relative_cost());
         Ok(out)
     }
 
     fn refit_into(&self, out: &mut Self, prims: &Triangles<'_>) -> Refit {
-        let same = prims.topology_epoch == self.topology_epoch
-            && prims.len() == self.prim_count
-            && prims.positions.len() == self.position_count;
-        if !same {
-            return Refit::NeedsRebuild;
-        }
-        if out.topology != self.topology {
-            out.clone_from(self);
-        }
-        out.take_positions(prims);
-        Refit::Done
+        lineage::refit_into(self, out, prims)
     }
 
     #[inline(always)]
@@ -297,7 +285,7 @@ impl Accel for Bvh8 {
     }
 
     fn decay(&self) -> f64 {
-        if self.fresh_cost > 0.0 { self.relative_cost() / self.fresh_cost } else { 1.0 }
+        self.lineage.decay(self.relative_cost())
     }
 }
 

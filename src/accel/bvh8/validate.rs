@@ -9,8 +9,8 @@ use crate::{
 
 /// Checks structure, boxes and corners; the first violation in words.
 pub(super) fn validate(bvh: &Bvh8, prims: &Triangles<'_>) -> Result<(), String> {
-    if bvh.prim_count != prims.len() {
-        return Err(format!("{} triangles, built over {}", prims.len(), bvh.prim_count));
+    if bvh.lineage.prims() != prims.len() {
+        return Err(format!("{} triangles, built over {}", prims.len(), bvh.lineage.prims()));
     }
     let mut walk = Walk { bvh, prims, seen: vec![false; prims.len()], next_node: 0, next_block: 0 };
     let bounds = walk.node(0, 1)?;

@@ -30,8 +30,6 @@ mod traverse;
 mod validate;
 mod wide;
 
-use std::sync::atomic::AtomicU64;
-
 use super::{
     Accel, AccelConfig, AccelStats, BuildError, Closest, Counter, HitSink, Refit, TravRay, Violation, sah,
     topology::{self, Cut},
@@ -42,9 +40,6 @@ use crate::{
 };
 use narrow::Narrow;
 use wide::Wide;
-
-/// Tells topologies apart: structures with equal numbers differ in planes and corners only.
-static NEXT_TOPOLOGY: AtomicU64 = AtomicU64::new(0);
 
 /// A built hierarchy.
 #[derive(Clone, Debug)]

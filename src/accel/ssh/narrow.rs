@@ -1,17 +1,18 @@
 //! The form of the paper: a binary tree with one plane a node.
 
-use std::sync::atomic::Ordering;
-
 use super::{
-    NEXT_TOPOLOGY, Sides, SshConfig, build,
+    Sides, SshConfig, build,
     node::{MAX_TRIANGLES, Pair, Word},
     refit::{self, Blocks, Boxes, Keep, Leaves, Measured, Slots, Store, Subtree, Swept},
     validate,
 };
 use crate::{
     accel::{
-        Accel, AccelStats, BuildError, Closest, Counter, HitSink, Refit, TravRay, Violation, block::TriBlock,
-        check_indices, sah, topology,
+        Accel, AccelStats, BuildError, Closest, Counter, HitSink, Refit, TravRay, Violation,
+        block::TriBlock,
+        check_indices,
+        lineage::{self, Lineage, Refittable},
+        sah, topology,
     },
     geom::{Aabb, Triangles},
     simd::Simd,
@@ -33,14 +34,9 @@ pub(super) struct Narrow {
     /// Leaves are lanes of blocks.
     pub(super) packed: bool,
     pub(super) config: SshConfig,
-    pub(super) topology: u64,
-    pub(super) topology_epoch: u64,
-    pub(super) prim_count: usize,
-    pub(super) position_count: usize,
+    pub(super) lineage: Lineage,
     pub(super) measured: Measured,
     pub(super) own_area: f64,
-    /// Expected cost of a ray per own area of the triangles, right after the build.
-    pub(super) fresh_cost: f64,
 }
 
 impl Clone for Narrow {
@@ -155,6 +151,16 @@ fn sweep<L: Leaves>(
     }
 }
 
+impl Refittable for Narrow {
+    fn lineage(&self) -> &Lineage {
+        &self.lineage
+    }
+
+    fn retake(&mut self, prims: &Triangles<'_>) {
+        self.take_positions(prims, self.config.refit == Sides::Rechoose);
+    }
+}
+
 impl Accel for Narrow {
     const NAME: &'static str = "ssh";
     type Config = SshConfig;
@@ -175,31 +181,17 @@ impl Accel for Narrow {
             reach: 0.0,
             packed,
             config: *config,
-            topology: NEXT_TOPOLOGY.fetch_add(1, Ordering::Relaxed),
-            topology_epoch: prims.topology_epoch,
-            prim_count: prims.len(),
-            position_count: prims.positions.len(),
+            lineage: Lineage::new(prims),
             measured: Measured::default(),
             own_area: 0.0,
-            fresh_cost: 0.0,
         };
         out.take_positions(prims, true);
-        out.fresh_cost = out.cost();
+        out.lineage.set_fresh_cost(out.cost());
         Ok(out)
     }
 
     fn refit_into(&self, out: &mut Self, prims: &Triangles<'_>) -> Refit {
-        let same = prims.topology_epoch == self.topology_epoch
-            && prims.len() == self.prim_count
-            && prims.positions.len() == self.position_count;
-        if !same {
-            return Refit::NeedsRebuild;
-        }
-        if out.topology != self.topology {
-            out.clone_from(self);
-        }
-        out.take_positions(prims, self.config.refit == Sides::Rechoose);
-        Refit::Done
+        lineage::refit_into(self, out, prims)
     }
 
     #[inline(always)]
@@ -274,6 +266,6 @@ impl Accel for Narrow {
     }
 
     fn decay(&self) -> f64 {
-        if self.fresh_cost > 0.0 { self.cost() / self.fresh_cost } else { 1.0 }
+        self.lineage.decay(self.cost())
     }
 }

@@ -12,15 +12,15 @@ use crate::{
 /// Of the invariants of a single slab hierarchy, every triangle below a node is held against the node's half-space, by the tightness of its plane;
 /// that regions nest and hold what is below them follows from it.
 pub(super) fn validate(ssh: &Narrow, prims: &Triangles<'_>) -> Result<(), String> {
-    if ssh.prim_count != prims.len() {
-        return Err(format!("{} triangles, built over {}", prims.len(), ssh.prim_count));
+    if ssh.lineage.prims() != prims.len() {
+        return Err(format!("{} triangles, built over {}", prims.len(), ssh.lineage.prims()));
     }
     let mut walk = Walk { ssh, prims, seen: vec![false; prims.len()], next_pair: 0, next_place: 0 };
     let bounds = walk.pair(ssh.root, &ssh.bounds, 1)?;
     if bounds != ssh.bounds && !(bounds.is_empty() && ssh.bounds.is_empty()) {
         return Err("the root box is not the box of all triangles".into());
     }
-    let places = if ssh.packed { ssh.prim_count } else { ssh.blocks.len() };
+    let places = if ssh.packed { ssh.lineage.prims() } else { ssh.blocks.len() };
     if walk.next_pair != ssh.pairs.len() || walk.next_place != places {
         return Err("pairs or blocks are out of reach".into());
     }

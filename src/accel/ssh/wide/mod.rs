@@ -9,14 +9,14 @@ mod packet;
 mod refit;
 mod validate;
 
-use std::sync::atomic::Ordering;
-
-use super::{NEXT_TOPOLOGY, Sides, SshConfig, refit::Measured};
+use super::{Sides, SshConfig, refit::Measured};
 use crate::{
     accel::{
         Accel, AccelStats, BuildError, Closest, Counter, HitSink, Refit, TravRay, Violation,
         block::TriBlock,
-        check_indices, sah,
+        check_indices,
+        lineage::{self, Lineage, Refittable},
+        sah,
         topology::{self, Child, wide::collapse},
         wide::{Place, Tree, WIDTH, refit::Subtree},
     },
@@ -38,14 +38,9 @@ pub(super) struct Wide<const K: usize> {
     /// Greatest absolute coordinate of the bounds.
     reach: f32,
     config: SshConfig,
-    topology: u64,
-    topology_epoch: u64,
-    prim_count: usize,
-    position_count: usize,
+    lineage: Lineage,
     measured: Measured,
     own_area: f64,
-    /// Expected cost of a ray per own area of the triangles, right after the build.
-    fresh_cost: f64,
 }
 
 impl<const K: usize> Clone for Wide<K> {
@@ -187,6 +182,16 @@ fn span(spans: &[u8], first: usize) -> usize {
     if spans.is_empty() { 1 } else { usize::from(spans[first]) }
 }
 
+impl<const K: usize> Refittable for Wide<K> {
+    fn lineage(&self) -> &Lineage {
+        &self.lineage
+    }
+
+    fn retake(&mut self, prims: &Triangles<'_>) {
+        self.take_positions(prims, self.config.refit == Sides::Rechoose);
+    }
+}
+
 impl<const K: usize> Accel for Wide<K> {
     const NAME: &'static str = "ssh";
     type Config = SshConfig;
@@ -204,32 +209,18 @@ impl<const K: usize> Accel for Wide<K> {
             bounds: Aabb::EMPTY,
             reach: 0.0,
             config: *config,
-            topology: NEXT_TOPOLOGY.fetch_add(1, Ordering::Relaxed),
-            topology_epoch: prims.topology_epoch,
-            prim_count: prims.len(),
-            position_count: prims.positions.len(),
+            lineage: Lineage::new(prims),
             measured: Measured::default(),
             own_area: 0.0,
-            fresh_cost: 0.0,
         };
         out.emit(&collapse(&binary, prims), &binary.prims);
         out.take_positions(prims, true);
-        out.fresh_cost = out.cost();
+        out.lineage.set_fresh_cost(out.cost());
         Ok(out)
     }
 
     fn refit_into(&self, out: &mut Self, prims: &Triangles<'_>) -> Refit {
-        let same = prims.topology_epoch == self.topology_epoch
-            && prims.len() == self.prim_count
-            && prims.positions.len() == self.position_count;
-        if !same {
-            return Refit::NeedsRebuild;
-        }
-        if out.topology != self.topology {
-            out.clone_from(self);
-        }
-        out.take_positions(prims, self.config.refit == Sides::Rechoose);
-        Refit::Done
+        lineage::refit_into(self, out, prims)
     }
 
     #[inline(always)]
@@ -304,7 +295,7 @@ impl<const K: usize> Accel for Wide<K> {
     }
 
     fn decay(&self) -> f64 {
-        if self.fresh_cost > 0.0 { self.cost() / self.fresh_cost } else { 1.0 }
+        self.lineage.decay(self.cost())
     }
 }
 

@@ -12,8 +12,8 @@ use crate::{
 
 /// Checks structure, planes and corners; the first violation in words.
 pub(super) fn validate<const K: usize>(tree: &Wide<K>, prims: &Triangles<'_>) -> Result<(), String> {
-    if tree.prim_count != prims.len() {
-        return Err(format!("{} triangles, built over {}", prims.len(), tree.prim_count));
+    if tree.lineage.prims() != prims.len() {
+        return Err(format!("{} triangles, built over {}", prims.len(), tree.lineage.prims()));
     }
     let mut walk = Walk { tree, prims, seen: vec![false; prims.len()], next_node: 0, next_block: 0 };
     let bounds = walk.node(0, &tree.bounds, 1)?;
