@@ -23,7 +23,7 @@ use super::{
     sah,
     topology::{self, Child, Cut, wide::collapse},
     wide::{
-        Place, Tree, WIDTH,
+        Place, Tree, WIDTH, packet as wide_packet,
         refit::{Store, Subtree},
     },
 };
@@ -240,26 +240,26 @@ impl Accel for Bvh8 {
     #[inline(always)]
     fn closest_packet<S: Simd, C: Counter, K: HitSink>(
         &self,
-        _prims: &Triangles<'_>,
+        prims: &Triangles<'_>,
         rays: &[TravRay],
         active: u32,
         best: &mut [Closest],
         sinks: &[K],
         count: &mut C,
     ) {
-        self.walk_closest_packet::<S, C, K>(rays, active, best, sinks, count);
+        wide_packet::closest_packet::<S, Self, C, K>(self, prims, rays, active, best, sinks, count);
     }
 
     #[inline(always)]
     fn occluded_packet<S: Simd, C: Counter, K: HitSink>(
         &self,
-        _prims: &Triangles<'_>,
+        prims: &Triangles<'_>,
         rays: &[TravRay],
         active: u32,
         sinks: &[K],
         count: &mut C,
     ) -> u32 {
-        self.walk_occluded_packet::<S, C, K>(rays, active, sinks, count)
+        wide_packet::occluded_packet::<S, Self, C, K>(self, prims, rays, active, sinks, count)
     }
 
     fn validate(&self, prims: &Triangles<'_>) -> Result<(), Violation> {

@@ -9,21 +9,18 @@ use crate::{
     accel::{
         Closest, Counter, HitSink, TravRay,
         block::TriBlock,
-        packet::{PacketRays, bits},
+        packet::PacketRays,
         query::SLACK,
         slabs::{Extent, Slab},
         wide::{
             WIDTH,
-            packet::{self, Entry, FEW, Spread, Together, range, spreads},
+            packet::{Entry, GROW, PacketTree, Spread, Together, range, spreads},
             walk,
         },
     },
     geom::Precision,
     simd::{Lanes, Simd},
 };
-
-/// Relative slack between the entries and exits of all rays together: 8 * 2^-24, for three roundings of each.
-const GROW: f32 = 1.0 + 8.0 / 16_777_216.0;
 
 /// `(plane - origin) * inv` of the first or the last ray to pass a plane.
 #[derive(Clone, Copy)]
@@ -34,7 +31,7 @@ struct End<S: Simd> {
 
 /// All rays by their bounds, and each of them by itself: [`Spread::ends`](crate::accel::wide::packet::Spread::ends) has the proof
 /// of the first, and that of the second is at [`Slab`], lane by lane.
-struct Packet<S: Simd> {
+pub(in crate::accel) struct Packet<S: Simd> {
     /// By axis, entries and exits.
     ends: [[End<S>; 2]; 3],
     /// 1 where the rays run downward.
@@ -162,81 +159,19 @@ impl<S: Simd> Together<S, Bvh8> for Packet<S> {
     }
 }
 
-impl Bvh8 {
-    #[inline(always)]
-    pub(super) fn walk_closest_packet<S: Simd, C: Counter, K: HitSink>(
-        &self,
-        rays: &[TravRay],
-        active: u32,
-        best: &mut [Closest],
-        sinks: &[K],
-        count: &mut C,
-    ) {
-        for (start, end, mut left) in packet::lanes::<S>(rays.len(), active) {
-            let (rays, best, sinks) = (&rays[start..end], &mut best[start..end], &sinks[start..end]);
-            while left != 0 {
-                let (members, backward) = packet::group(|ray| self.fits(ray), rays, left);
-                left &= !members;
-                if members.count_ones() > FEW {
-                    self.closest_together::<S, C, K>(rays, members, backward, best, sinks, count);
-                } else {
-                    for i in bits(members) {
-                        self.walk_closest::<S, C, K>(&rays[i], &mut best[i], &sinks[i], count);
-                    }
-                }
-            }
-        }
-    }
+impl PacketTree for Bvh8 {
+    type Packet<S: Simd> = Packet<S>;
 
     #[inline(always)]
-    fn closest_together<S: Simd, C: Counter, K: HitSink>(
+    fn start<S: Simd>(
         &self,
-        rays: &[TravRay],
-        mask: u32,
-        backward: [bool; 3],
-        best: &mut [Closest],
-        sinks: &[K],
-        count: &mut C,
-    ) {
-        let mut packet = PacketRays::new(rays, self.reach);
-        for (i, best) in best.iter().enumerate() {
-            packet.set_limit(i, best);
-        }
-        let together = Packet::<S>::new(&packet, (mask, backward), self.reach, rays[0].forms().nodes);
-        let start = Entry { word: Self::root(), mask, mark: (), rays: together.near };
-        packet::closest::<S, _, _, C, K>(self, together, start, rays, &mut packet, (best, sinks), count);
-    }
-
-    /// The active rays that something blocks.
-    #[inline(always)]
-    pub(super) fn walk_occluded_packet<S: Simd, C: Counter, K: HitSink>(
-        &self,
-        rays: &[TravRay],
-        active: u32,
-        sinks: &[K],
-        count: &mut C,
-    ) -> u32 {
-        let mut blocked = 0;
-        for (start, end, mut left) in packet::lanes::<S>(rays.len(), active) {
-            let (rays, sinks) = (&rays[start..end], &sinks[start..end]);
-            while left != 0 {
-                let (members, backward) = packet::group(|ray| self.fits(ray), rays, left);
-                left &= !members;
-                if members.count_ones() > FEW {
-                    let packet = PacketRays::new(rays, self.reach);
-                    let together = Packet::<S>::new(&packet, (members, backward), self.reach, rays[0].forms().nodes);
-                    let root = Entry { word: Self::root(), mask: members, mark: (), rays: together.near };
-                    let hits = packet::occluded::<S, _, _, C, K>(self, &together, root, rays, &packet, sinks, count);
-                    blocked |= hits << start;
-                } else {
-                    for i in bits(members) {
-                        let hit = self.walk_occluded::<S, C, K>(&rays[i], &sinks[i], count);
-                        blocked |= u32::from(hit) << (start + i);
-                    }
-                }
-            }
-        }
-        blocked
+        packet: &PacketRays,
+        rays: (u32, [bool; 3]),
+        nodes: Precision,
+    ) -> (Packet<S>, Option<Entry<S, Self, Packet<S>>>) {
+        let together = Packet::<S>::new(packet, rays, self.reach, nodes);
+        let root = Entry { word: Self::root(), mask: rays.0, mark: (), rays: together.near };
+        (together, Some(root))
     }
 }
 

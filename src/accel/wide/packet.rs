@@ -5,16 +5,21 @@ use arrayvec::ArrayVec;
 use super::{Place, Tree, WIDTH, WideNode, Word};
 use crate::{
     accel::{
-        Closest, Counter, HitSink, TravRay,
+        Accel, Closest, Counter, HitSink, TravRay,
         block::TriBlock,
         packet::{PACKET, PacketRays, bits},
+        run, slabs,
         topology::MAX_DEPTH,
     },
+    geom::{Precision, Triangles},
     simd::{Lanes, Simd},
 };
 
 /// Up to this many rays are walked one by one.
-pub(in crate::accel) const FEW: u32 = 2;
+const FEW: u32 = 2;
+
+/// Relative slack between the entries and exits of all rays together: 8 * 2^-24, for three roundings of each.
+pub(in crate::accel) const GROW: f32 = 1.0 + 8.0 / 16_777_216.0;
 
 /// Rays of common direction signs, one to a lane.
 pub(in crate::accel) trait Together<S: Simd, T: Tree> {
@@ -68,6 +73,82 @@ pub(in crate::accel) struct Entry<S: Simd, T: Tree, P: Together<S, T>> {
     pub(in crate::accel) rays: P::Rays,
 }
 
+/// A tree whose packets are walked together.
+pub(in crate::accel) trait PacketTree: Tree + Accel {
+    /// Its packets.
+    type Packet<S: Simd>: Together<S, Self>;
+
+    /// A packet of rays with `backward` signs, and the root for those that may meet it.
+    fn start<S: Simd>(
+        &self,
+        packet: &PacketRays,
+        rays: (u32, [bool; 3]),
+        nodes: Precision,
+    ) -> (Self::Packet<S>, Option<Entry<S, Self, Self::Packet<S>>>);
+}
+
+/// As [`Accel::closest_packet`].
+#[inline(always)]
+pub(in crate::accel) fn closest_packet<S: Simd, T: PacketTree, C: Counter, H: HitSink>(
+    tree: &T,
+    prims: &Triangles<'_>,
+    rays: &[TravRay],
+    active: u32,
+    best: &mut [Closest],
+    sinks: &[H],
+    count: &mut C,
+) {
+    for (start, end, mut left) in lanes::<S>(rays.len(), active) {
+        let (rays, best, sinks) = (&rays[start..end], &mut best[start..end], &sinks[start..end]);
+        while left != 0 {
+            let (members, backward) = group(|ray| slabs::fits(ray, tree.reach()), rays, left);
+            left &= !members;
+            if members.count_ones() <= FEW {
+                run::closest_singly::<S, T, C, H>(tree, prims, rays, members, best, sinks, count);
+                continue;
+            }
+            let mut packet = PacketRays::new(rays, tree.reach());
+            for (i, best) in best.iter().enumerate() {
+                packet.set_limit(i, best);
+            }
+            let (together, root) = tree.start::<S>(&packet, (members, backward), rays[0].forms().nodes);
+            if let Some(root) = root {
+                closest::<S, T, _, C, H>(tree, together, root, rays, &mut packet, (&mut *best, sinks), count);
+            }
+        }
+    }
+}
+
+/// As [`Accel::occluded_packet`].
+#[inline(always)]
+pub(in crate::accel) fn occluded_packet<S: Simd, T: PacketTree, C: Counter, H: HitSink>(
+    tree: &T,
+    prims: &Triangles<'_>,
+    rays: &[TravRay],
+    active: u32,
+    sinks: &[H],
+    count: &mut C,
+) -> u32 {
+    let mut blocked = 0;
+    for (start, end, mut left) in lanes::<S>(rays.len(), active) {
+        let (rays, sinks) = (&rays[start..end], &sinks[start..end]);
+        while left != 0 {
+            let (members, backward) = group(|ray| slabs::fits(ray, tree.reach()), rays, left);
+            left &= !members;
+            if members.count_ones() <= FEW {
+                blocked |= run::occluded_singly::<S, T, C, H>(tree, prims, rays, members, sinks, count) << start;
+                continue;
+            }
+            let packet = PacketRays::new(rays, tree.reach());
+            let (together, root) = tree.start::<S>(&packet, (members, backward), rays[0].forms().nodes);
+            if let Some(root) = root {
+                blocked |= occluded::<S, T, _, C, H>(tree, &together, root, rays, &packet, sinks, count) << start;
+            }
+        }
+    }
+    blocked
+}
+
 /// Nodes to visit, the next last.
 type Stack<S, T, P> = ArrayVec<Entry<S, T, P>, { MAX_DEPTH * (WIDTH - 1) + 1 }>;
 
@@ -106,7 +187,7 @@ fn descend<S: Simd, T: Tree, P: Together<S, T>>(
 
 /// Offers the triangles below a node to the rays of a packet.
 #[inline(always)]
-pub(in crate::accel) fn closest<S: Simd, T: Tree, P: Together<S, T>, C: Counter, H: HitSink>(
+fn closest<S: Simd, T: Tree, P: Together<S, T>, C: Counter, H: HitSink>(
     tree: &T,
     mut together: P,
     start: Entry<S, T, P>,
@@ -146,7 +227,7 @@ pub(in crate::accel) fn closest<S: Simd, T: Tree, P: Together<S, T>, C: Counter,
 
 /// The rays of the start that something blocks.
 #[inline(always)]
-pub(in crate::accel) fn occluded<S: Simd, T: Tree, P: Together<S, T>, C: Counter, H: HitSink>(
+fn occluded<S: Simd, T: Tree, P: Together<S, T>, C: Counter, H: HitSink>(
     tree: &T,
     together: &P,
     start: Entry<S, T, P>,
@@ -236,7 +317,7 @@ pub(in crate::accel) fn range(row: &[f32; PACKET], active: u32) -> [f32; 2] {
 
 /// The rays that go into one vector each time: the first, the end, and the active ones among them.
 #[inline(always)]
-pub(in crate::accel) fn lanes<S: Simd>(rays: usize, active: u32) -> impl Iterator<Item = (usize, usize, u32)> {
+fn lanes<S: Simd>(rays: usize, active: u32) -> impl Iterator<Item = (usize, usize, u32)> {
     (0..rays).step_by(S::F::LEN).map(move |start| {
         let end = rays.min(start + S::F::LEN);
         (start, end, (active >> start) & ((1 << (end - start)) - 1))

@@ -22,13 +22,13 @@ use crate::{
 
 /// The part of a ray inside a child.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Segment<T> {
+pub(in crate::accel) struct Segment<T> {
     pub(super) near: T,
     pub(super) far: T,
 }
 
 /// Segments of all children.
-pub(super) struct Segments<T> {
+pub(in crate::accel) struct Segments<T> {
     pub(super) near: [T; WIDTH],
     pub(super) far: [T; WIDTH],
 }

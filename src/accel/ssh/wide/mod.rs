@@ -18,7 +18,7 @@ use crate::{
         lineage::{self, Lineage, Refittable},
         sah,
         topology::{self, Child, wide::collapse},
-        wide::{Place, Tree, WIDTH, refit::Subtree},
+        wide::{Place, Tree, WIDTH, packet as wide_packet, refit::Subtree},
     },
     geom::{Aabb, Triangles},
     simd::Simd,
@@ -249,26 +249,26 @@ impl<const K: usize> Accel for Wide<K> {
     #[inline(always)]
     fn closest_packet<S: Simd, C: Counter, K2: HitSink>(
         &self,
-        _prims: &Triangles<'_>,
+        prims: &Triangles<'_>,
         rays: &[TravRay],
         active: u32,
         best: &mut [Closest],
         sinks: &[K2],
         count: &mut C,
     ) {
-        self.walk_closest_packet::<S, C, K2>(rays, active, best, sinks, count);
+        wide_packet::closest_packet::<S, Self, C, K2>(self, prims, rays, active, best, sinks, count);
     }
 
     #[inline(always)]
     fn occluded_packet<S: Simd, C: Counter, K2: HitSink>(
         &self,
-        _prims: &Triangles<'_>,
+        prims: &Triangles<'_>,
         rays: &[TravRay],
         active: u32,
         sinks: &[K2],
         count: &mut C,
     ) -> u32 {
-        self.walk_occluded_packet::<S, C, K2>(rays, active, sinks, count)
+        wide_packet::occluded_packet::<S, Self, C, K2>(self, prims, rays, active, sinks, count)
     }
 
     fn validate(&self, prims: &Triangles<'_>) -> Result<(), Violation> {

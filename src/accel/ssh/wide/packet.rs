@@ -9,20 +9,18 @@ use crate::{
     accel::{
         Closest, Counter, HitSink, TravRay,
         block::TriBlock,
-        packet::{PACKET, PacketRays, bits},
+        packet::{PACKET, PacketRays},
         query::SLACK,
         ssh::packet::{self as slabs, PacketSlabs},
         wide::{
             WIDTH, WideNode,
-            packet::{self, Entry, FEW, Together, range, spreads},
+            packet::{Entry, GROW, PacketTree, Together, range, spreads},
             walk,
         },
     },
+    geom::Precision,
     simd::{Lanes, Simd},
 };
-
-/// Relative slack between the entries and exits of all rays together: 8 * 2^-24, for three roundings of each.
-const GROW: f32 = 1.0 + 8.0 / 16_777_216.0;
 
 /// `(plane - origin) * inv` of the first or the last ray to pass a plane.
 #[derive(Clone, Copy)]
@@ -54,7 +52,7 @@ impl<S: Simd> End<S> for Bound<S> {
 
 /// All rays by their bounds, and each of them by its own planes: [`Spread::ends`](crate::accel::wide::packet::Spread::ends) has the proof
 /// of the first, and that of the second is at the packets of the paper's form.
-struct Packet<S: Simd> {
+pub(in crate::accel) struct Packet<S: Simd> {
     slabs: PacketSlabs<S>,
     entry: Bound<S>,
     exit: Bound<S>,
@@ -164,98 +162,22 @@ impl<S: Simd, const K: usize> Together<S, Wide<K>> for Packet<S> {
     }
 }
 
-impl<const K: usize> Wide<K> {
-    #[inline(always)]
-    pub(super) fn walk_closest_packet<S: Simd, C: Counter, H: HitSink>(
-        &self,
-        rays: &[TravRay],
-        active: u32,
-        best: &mut [Closest],
-        sinks: &[H],
-        count: &mut C,
-    ) {
-        for (start, end, mut left) in packet::lanes::<S>(rays.len(), active) {
-            let (rays, best, sinks) = (&rays[start..end], &mut best[start..end], &sinks[start..end]);
-            while left != 0 {
-                let (members, backward) = packet::group(|ray| self.fits(ray), rays, left);
-                left &= !members;
-                if members.count_ones() > FEW {
-                    self.closest_together::<S, C, H>(rays, members, backward, best, sinks, count);
-                } else {
-                    for i in bits(members) {
-                        self.walk_closest::<S, C, H>(&rays[i], &mut best[i], &sinks[i], count);
-                    }
-                }
-            }
-        }
-    }
+impl<const K: usize> PacketTree for Wide<K> {
+    type Packet<S: Simd> = Packet<S>;
 
-    #[inline(always)]
-    fn closest_together<S: Simd, C: Counter, H: HitSink>(
-        &self,
-        rays: &[TravRay],
-        active: u32,
-        backward: [bool; 3],
-        best: &mut [Closest],
-        sinks: &[H],
-        count: &mut C,
-    ) {
-        let mut packet = PacketRays::new(rays, self.reach);
-        for (i, best) in best.iter().enumerate() {
-            packet.set_limit(i, best);
-        }
-        let together = Packet::<S>::new(&packet, active, backward);
-        if let Some(start) = self.start(&together, &packet, active) {
-            packet::closest::<S, _, _, C, H>(self, together, start, rays, &mut packet, (best, sinks), count);
-        }
-    }
-
-    /// The root, for the rays that meet its box.
     #[inline(always)]
     fn start<S: Simd>(
         &self,
-        together: &Packet<S>,
         packet: &PacketRays,
-        active: u32,
-    ) -> Option<Entry<S, Self, Packet<S>>> {
+        (active, backward): (u32, [bool; 3]),
+        _nodes: Precision,
+    ) -> (Packet<S>, Option<Entry<S, Self, Packet<S>>>) {
+        let together = Packet::<S>::new(packet, active, backward);
         let rays = together.slabs.clipped(&self.bounds);
         let mask = rays.open() & active;
         let mark = Segment { near: range(&packet.t_near32, active)[0], far: range(&packet.t_cull, active)[1] };
-        (mask != 0).then_some(Entry { word: Self::root(), mask, mark, rays })
-    }
-
-    /// The active rays that something blocks.
-    #[inline(always)]
-    pub(super) fn walk_occluded_packet<S: Simd, C: Counter, H: HitSink>(
-        &self,
-        rays: &[TravRay],
-        active: u32,
-        sinks: &[H],
-        count: &mut C,
-    ) -> u32 {
-        let mut blocked = 0;
-        for (start, end, mut left) in packet::lanes::<S>(rays.len(), active) {
-            let (rays, sinks) = (&rays[start..end], &sinks[start..end]);
-            while left != 0 {
-                let (members, backward) = packet::group(|ray| self.fits(ray), rays, left);
-                left &= !members;
-                if members.count_ones() > FEW {
-                    let packet = PacketRays::new(rays, self.reach);
-                    let together = Packet::<S>::new(&packet, members, backward);
-                    if let Some(root) = self.start(&together, &packet, members) {
-                        let hits =
-                            packet::occluded::<S, _, _, C, H>(self, &together, root, rays, &packet, sinks, count);
-                        blocked |= hits << start;
-                    }
-                } else {
-                    for i in bits(members) {
-                        let hit = self.walk_occluded::<S, C, H>(&rays[i], &sinks[i], count);
-                        blocked |= u32::from(hit) << (start + i);
-                    }
-                }
-            }
-        }
-        blocked
+        let root = (mask != 0).then_some(Entry { word: Self::root(), mask, mark, rays });
+        (together, root)
     }
 }
 
