@@ -194,7 +194,27 @@ fn a_still_scene_is_built_once_and_never_touched_again() {
     }
     let counts = frames.counts();
     assert_eq!((counts.builds, counts.deforms, counts.refits, counts.rebuilds_begun), (1, 1, 0, 0));
+    assert_eq!((counts.leaf_refits, counts.event_sorts), (0, 0));
     assert_eq!(counts.frames, 10);
+    // As many as worlds turn: this frame's and the last one's.
+    assert!(counts.tops <= 2, "{counts:?}");
+}
+
+#[test]
+fn event_lists_are_sorted_only_where_the_level_over_groups_is_made_of_them() {
+    for top in TopKind::ALL {
+        let mut frames = FrameLoop::new(config("bvh2", top.name(), RebuildPolicy::Refit, 1)).unwrap();
+        cast_of_actors(&mut frames);
+        let inversions = TIMES.map(|time_s| {
+            drop(advance(&mut frames, time_s));
+            let found = frames.last_frame().inversions;
+            found.swaps + found.whole
+        });
+        let counts = frames.counts();
+        assert_eq!(counts.tops, TIMES.len() as u64, "everything moves");
+        assert_eq!(counts.event_sorts, if top == TopKind::Events { counts.tops } else { 0 }, "{top:?}");
+        assert_eq!(inversions.iter().any(|&found| found > 0), top == TopKind::Events, "{top:?} {inversions:?}");
+    }
 }
 
 #[test]

@@ -249,3 +249,43 @@ fn the_papers_tables_stand_beside_ours_and_name_what_is_substituted() {
     assert!(checks.iter().all(|c| c["verdict"].is_string()) && checks.len() > 10);
     assert_eq!(report["plots"].as_array().map(Vec::len), Some(10));
 }
+
+/// Three frames of two triangles that part, as .tris.
+fn sequence(folder: &Path) -> String {
+    let folder = folder.join("parting");
+    fs::create_dir_all(&folder).expect("a folder");
+    for frame in 0..3_u8 {
+        let mut bytes = b"TRI1".to_vec();
+        bytes.extend(2_u32.to_le_bytes());
+        for side in [-1.0_f32, 1.0] {
+            let x = side * (0.1 + f32::from(frame));
+            let corners = [[x, 0.0, 0.0], [x + 1.0, 0.0, 0.2], [x, 1.0, 0.1]];
+            bytes.extend(corners.as_flattened().iter().flat_map(|v| v.to_le_bytes()));
+        }
+        fs::write(folder.join(format!("frame_{frame:04}.tris")), bytes).expect("written");
+    }
+    folder.display().to_string()
+}
+
+#[test]
+fn frames_are_reported_for_every_policy_with_equal_answers() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let out = dir.path().join("report");
+    let mut command = kinora();
+    command.args(["report", "frames", &sequence(dir.path()), "--quick", "--check", "--threads", "2"]);
+    command.args(["--policy", "rebuild,refit,async,swap-every=2", "--output"]).arg(&out).assert().success();
+    let value: Value = serde_json::from_slice(&fs::read(out.join("frames.json")).expect("written")).expect("JSON");
+    let rows = |table: &str| {
+        let rows = value["rows"].as_array().expect("rows").iter();
+        rows.filter(|row| row["table"] == table).cloned().collect::<Vec<_>>()
+    };
+    let summary = rows("summary");
+    let policies: Vec<_> = summary.iter().map(|row| row["policy"].as_str().expect("a name").to_owned()).collect();
+    assert_eq!(policies, ["rebuild", "refit", "async", "swap-every=2"]);
+    assert!(summary.iter().all(|row| row["differences"] == 0 && row["scene"] == "parting"));
+    assert!(summary[3]["swaps"].as_u64().expect("a count") > 10, "{}", summary[3]);
+    assert_eq!(rows("frames").len(), 4 * 40);
+    let markdown = fs::read_to_string(out.join("frames.md")).expect("written");
+    assert!(markdown.contains("swap-every=2") && !markdown.contains("## Frames"), "{markdown}");
+    assert!(out.join("trace-parting.svg").is_file());
+}

@@ -46,6 +46,8 @@ pub(super) struct Built {
     pub(super) accel: AnyAccel,
     /// The vertices that it was built from.
     pub(super) positions: Arc<Vec<Vec3>>,
+    /// The frame that they are of.
+    pub(super) frame: u64,
 }
 
 /// Why a job gave no tree.
@@ -141,7 +143,7 @@ fn run(pool: &rayon::ThreadPool, spec: &AccelSpec, job: Job) -> Outcome {
         pool.install(|| spec.build(&job.layout.triangles(&job.positions)))
     };
     let result = match catch_unwind(AssertUnwindSafe(build)) {
-        Ok(Ok(accel)) => Ok(Built { accel, positions: job.positions }),
+        Ok(Ok(accel)) => Ok(Built { accel, positions: job.positions, frame: job.frame }),
         Ok(Err(error)) => Err(Failure::Build(error)),
         Err(panic) => Err(Failure::Panicked(message(panic.as_ref()))),
     };

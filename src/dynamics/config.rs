@@ -1,6 +1,6 @@
-use std::{sync::Arc, time::Duration};
+use std::{fmt, sync::Arc, time::Duration};
 
-use crate::geom::Forms;
+use crate::{accel::events::Inversions, geom::Forms};
 
 /// Why a frame could not be made.
 #[derive(Debug, thiserror::Error)]
@@ -47,6 +47,8 @@ pub struct StageTimes {
     pub deform: Duration,
     /// Structures to the new vertices, synchronous builds and the level over groups.
     pub refit: Duration,
+    /// What of `refit` the level over groups took.
+    pub sort: Duration,
 }
 
 impl StageTimes {
@@ -67,17 +69,38 @@ pub struct LoopCounts {
     pub deforms: u64,
     /// Structures refitted, those of finished rebuilds included.
     pub refits: u64,
+    /// Triangles whose place in a leaf was written by these refits.
+    pub leaf_refits: u64,
     /// Structures built before tracing: first builds, and those of a policy or structure that cannot refit.
     pub builds: u64,
     /// Rebuilds handed to the background builder.
     pub rebuilds_begun: u64,
     /// Rebuilt trees swapped in.
     pub swaps: u64,
+    /// Levels over groups made anew; a frame in which no group moved keeps the one it has.
+    pub tops: u64,
+    /// Those of them that sorted event lists: none unless the level over groups is `events`.
+    pub event_sorts: u64,
     /// Rebuilt trees dropped because the triangles they were built over are gone.
     pub rebuilds_dropped: u64,
     /// Worst quality seen, at least 1: surface-area cost over that of the last fresh build of the same
     /// triangles, both relative to the area of the triangles' own boxes.
     pub quality_max: f64,
+}
+
+/// What the loop did for the last frame.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct FrameState {
+    /// The worst quality of any structure, as [`LoopCounts::quality_max`] has it.
+    pub quality: f64,
+    /// Rebuilt trees swapped in.
+    pub swaps: u64,
+    /// Structures built before tracing.
+    pub builds: u64,
+    /// The most frames that lie between a tree and the vertices that it was built from, over trees whose triangles have moved since.
+    pub tree_age: u64,
+    /// What it took to sort the event lists over groups again.
+    pub inversions: Inversions,
 }
 
 /// How trees are kept good.
@@ -93,6 +116,18 @@ pub enum RebuildPolicy {
     /// As `Async`, but a rebuild is begun every K frames (at least 1) and taken K frames later, whatever the
     /// timing and the quality.
     SwapEvery(u32),
+}
+
+impl fmt::Display for RebuildPolicy {
+    /// The name on the command line and in reports.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Refit => f.write_str("refit"),
+            Self::Rebuild => f.write_str("rebuild"),
+            Self::Async => f.write_str("async"),
+            Self::SwapEvery(every) => write!(f, "swap-every={every}"),
+        }
+    }
 }
 
 /// Settings of a loop.

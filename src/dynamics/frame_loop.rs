@@ -3,7 +3,7 @@ use std::{fmt, sync::Arc, time::Instant};
 use glam::DAffine3;
 
 use super::{
-    FrameConfig, FrameError, LoopCounts, RebuildPolicy, StageTimes,
+    FrameConfig, FrameError, FrameState, LoopCounts, RebuildPolicy, StageTimes,
     builder::{Builder, Failure, Outcome},
     group::Group,
     grouping::Grouping,
@@ -37,6 +37,7 @@ pub struct FrameLoop {
     builder: Option<Builder>,
     worlds: Pool<World>,
     counts: LoopCounts,
+    last: FrameState,
     #[cfg(test)]
     pub(super) panic_in_next_rebuild: bool,
 }
@@ -68,6 +69,7 @@ impl FrameLoop {
             builder: None,
             worlds: Pool::default(),
             counts: LoopCounts { quality_max: 1.0, ..LoopCounts::default() },
+            last: FrameState::default(),
             #[cfg(test)]
             panic_in_next_rebuild: false,
         })
@@ -116,6 +118,11 @@ impl FrameLoop {
         self.counts
     }
 
+    /// What the loop did for the last frame.
+    pub fn last_frame(&self) -> FrameState {
+        self.last
+    }
+
     /// Pose, deform, refit; in the loop's pool.
     fn make(&mut self, clips: &[&[ActiveClip]]) -> Result<(Arc<World>, StageTimes), FrameError> {
         check_float_mode()?;
@@ -138,14 +145,24 @@ impl FrameLoop {
         let began = Instant::now();
         let prims = self.stage.deformed_triangles();
         let _span = tracing::info_span!("refit", frame, accel = self.spec.kind().name(), prims).entered();
-        let work = self.stage.update(&self.spec, self.config.policy == RebuildPolicy::Rebuild)?;
+        let work = self.stage.update(&self.spec, self.config.policy == RebuildPolicy::Rebuild, frame)?;
         self.counts.refits += work.refits;
+        self.counts.leaf_refits += work.leaf_refits;
         self.counts.builds += work.builds;
         self.counts.swaps += work.swaps;
-        self.counts.quality_max = self.counts.quality_max.max(self.stage.quality());
+        let quality = self.stage.quality();
+        self.counts.quality_max = self.counts.quality_max.max(quality);
         let mut world = self.worlds.take(World::default);
         let next = Arc::get_mut(&mut world).expect("a taken buffer has one owner");
-        self.stage.fill(next, self.top);
+        self.stage.fill(next);
+        let sorting = Instant::now();
+        let covered = self.stage.cover(next, self.top);
+        times.sort = sorting.elapsed();
+        self.counts.tops += u64::from(covered);
+        self.counts.event_sorts += u64::from(covered && next.top.has_events());
+        let tree_age = self.stage.tree_age(frame);
+        let inversions = next.top.inversions();
+        self.last = FrameState { quality, swaps: work.swaps, builds: work.builds, tree_age, inversions };
         next.forms = self.config.forms;
         if let Some(instance) = next.beyond_f32() {
             let file = next.actor_scene(instance.actor as usize).file.clone();

@@ -32,6 +32,8 @@ pub(super) struct Group {
     deformed: bool,
     /// The vertices are not those that the structure was built from.
     moved_since_build: bool,
+    /// The frame whose vertices the structure was built from.
+    built_of: u64,
     rebuild: Rebuild,
     /// What the last `update` did, or why it failed.
     pub(super) outcome: Result<Work, FrameError>,
@@ -62,6 +64,7 @@ enum Rebuild {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Work {
     pub(super) refits: u64,
+    pub(super) leaf_refits: u64,
     pub(super) builds: u64,
     pub(super) swaps: u64,
 }
@@ -78,6 +81,7 @@ impl Group {
             accel_pool: Pool::default(),
             deformed: false,
             moved_since_build: false,
+            built_of: 0,
             rebuild: Rebuild::Idle,
             outcome: Ok(Work::default()),
         }
@@ -109,36 +113,37 @@ impl Group {
     }
 
     /// Brings the structure to the vertices: takes a finished rebuild, refits or builds, in the current rayon pool.
-    pub(super) fn update(&mut self, spec: &AccelSpec, rebuild_always: bool) {
-        self.outcome = self.try_update(spec, rebuild_always);
+    pub(super) fn update(&mut self, spec: &AccelSpec, rebuild_always: bool, frame: u64) {
+        self.outcome = self.try_update(spec, rebuild_always, frame);
         if self.outcome.is_err() {
             // Without a structure the next frame deforms and builds anew.
             self.accel = None;
         }
     }
 
-    fn try_update(&mut self, spec: &AccelSpec, rebuild_always: bool) -> Result<Work, FrameError> {
+    fn try_update(&mut self, spec: &AccelSpec, rebuild_always: bool, frame: u64) -> Result<Work, FrameError> {
         match mem::take(&mut self.rebuild) {
-            Rebuild::Finished(built) => return self.swap(*built, spec),
+            Rebuild::Finished(built) => return self.swap(*built, spec, frame),
             other => self.rebuild = other,
         }
         if !self.deformed {
             return Ok(Work::default());
         }
         match self.accel.take() {
-            Some(accel) if !rebuild_always => self.refit(&accel, spec),
-            _ => self.build(spec),
+            Some(accel) if !rebuild_always => self.refit(&accel, spec, frame),
+            _ => self.build(spec, frame),
         }
     }
 
-    fn swap(&mut self, built: Built, spec: &AccelSpec) -> Result<Work, FrameError> {
+    fn swap(&mut self, built: Built, spec: &AccelSpec, frame: u64) -> Result<Work, FrameError> {
         let base = Arc::new(built.accel);
+        self.built_of = built.frame;
         let work = if Arc::ptr_eq(&built.positions, &self.positions) {
             self.moved_since_build = false;
             self.accel = Some(base.clone());
             Work::default()
         } else {
-            self.refit(&base, spec)?
+            self.refit(&base, spec, frame)?
         };
         if base.refits() {
             self.accel_pool.keep(base);
@@ -146,9 +151,9 @@ impl Group {
         Ok(Work { swaps: 1, ..work })
     }
 
-    fn refit(&mut self, from: &Arc<AnyAccel>, spec: &AccelSpec) -> Result<Work, FrameError> {
+    fn refit(&mut self, from: &Arc<AnyAccel>, spec: &AccelSpec, frame: u64) -> Result<Work, FrameError> {
         if !from.refits() {
-            return self.build(spec);
+            return self.build(spec, frame);
         }
         let mut next = self.accel_pool.take(|| AnyAccel::clone(from));
         let out = Arc::get_mut(&mut next).expect("a taken buffer has one owner");
@@ -156,19 +161,20 @@ impl Group {
             Refit::Done => {
                 self.accel_pool.keep(next.clone());
                 self.accel = Some(next);
-                Ok(Work { refits: 1, ..Work::default() })
+                Ok(Work { refits: 1, leaf_refits: self.triangle_count() as u64, ..Work::default() })
             }
-            Refit::NeedsRebuild => self.build(spec),
+            Refit::NeedsRebuild => self.build(spec, frame),
         }
     }
 
-    fn build(&mut self, spec: &AccelSpec) -> Result<Work, FrameError> {
+    fn build(&mut self, spec: &AccelSpec, frame: u64) -> Result<Work, FrameError> {
         let accel = Arc::new(spec.build(&self.shape.layout.triangles(&self.positions))?);
         if accel.refits() {
             self.accel_pool.keep(accel.clone());
         }
         self.accel = Some(accel);
         self.moved_since_build = false;
+        self.built_of = frame;
         Ok(Work { builds: 1, ..Work::default() })
     }
 
@@ -182,6 +188,11 @@ impl Group {
     /// How much dearer rays are than right after the last build, by surface areas.
     pub(super) fn quality(&self) -> f64 {
         self.accel.as_ref().map_or(1.0, |accel| accel.decay())
+    }
+
+    /// Frames between `frame` and the one that the structure was built from; 0 when nothing moved since.
+    pub(super) fn tree_age(&self, frame: u64) -> u64 {
+        if self.moved_since_build { frame - self.built_of } else { 0 }
     }
 
     /// True when a background rebuild could improve the structure.

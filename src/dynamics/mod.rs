@@ -17,5 +17,5 @@ mod stage;
 #[cfg(test)]
 mod tests;
 
-pub use config::{FrameConfig, FrameError, LoopCounts, RebuildPolicy, StageTimes};
+pub use config::{FrameConfig, FrameError, FrameState, LoopCounts, RebuildPolicy, StageTimes};
 pub use frame_loop::FrameLoop;

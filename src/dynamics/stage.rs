@@ -32,6 +32,8 @@ pub(super) struct Stage {
     /// The groups are those of the actors.
     settled: bool,
     grouping: Grouping,
+    /// Changes whenever a box of a group may have.
+    boxes_version: u64,
 }
 
 impl Stage {
@@ -46,6 +48,7 @@ impl Stage {
             places: Arc::default(),
             settled: false,
             grouping,
+            boxes_version: 1,
         }
     }
 
@@ -106,6 +109,7 @@ impl Stage {
         self.instances = instances.into();
         self.places = places.into();
         self.settled = true;
+        self.boxes_version += 1;
         Ok(())
     }
 
@@ -165,19 +169,28 @@ impl Stage {
     }
 
     /// Brings every structure to its group's vertices.
-    pub(super) fn update(&mut self, spec: &AccelSpec, rebuild_always: bool) -> Result<Work, FrameError> {
+    pub(super) fn update(&mut self, spec: &AccelSpec, rebuild_always: bool, frame: u64) -> Result<Work, FrameError> {
         match &mut self.groups[..] {
-            [only] => only.update(spec, rebuild_always),
-            groups => groups.par_iter_mut().for_each(|group| group.update(spec, rebuild_always)),
+            [only] => only.update(spec, rebuild_always, frame),
+            groups => groups.par_iter_mut().for_each(|group| group.update(spec, rebuild_always, frame)),
         }
         let mut sum = Work::default();
         for group in &mut self.groups {
             let work = std::mem::replace(&mut group.outcome, Ok(Work::default()))?;
             sum.refits += work.refits;
+            sum.leaf_refits += work.leaf_refits;
             sum.builds += work.builds;
             sum.swaps += work.swaps;
         }
+        if self.groups.iter().any(Group::deformed) || sum.swaps + sum.builds > 0 {
+            self.boxes_version += 1;
+        }
         Ok(sum)
+    }
+
+    /// The greatest age of a tree, as [`Group::tree_age`].
+    pub(super) fn tree_age(&self, frame: u64) -> u64 {
+        self.groups.iter().map(|group| group.tree_age(frame)).max().unwrap_or(0)
     }
 
     /// The worst decay of any group.
@@ -206,8 +219,8 @@ impl Stage {
         self.groups.iter_mut().find(|group| group.shape.layout.topology_epoch == epoch)
     }
 
-    /// Makes `world` this frame's; it must have been cleared.
-    pub(super) fn fill(&mut self, world: &mut World, top: TopKind) {
+    /// Makes `world` this frame's; it must have been cleared. What became of the level over groups is left to [`Stage::cover`].
+    pub(super) fn fill(&mut self, world: &mut World) {
         if !Arc::ptr_eq(&world.instances, &self.instances) {
             world.instances = self.instances.clone();
             world.places = self.places.clone();
@@ -215,10 +228,16 @@ impl Stage {
         let frames = |actor: &Actor| ActorFrame { scene: actor.scene.clone(), pose: actor.pose.clone() };
         world.actors.extend(self.actors.iter().map(frames));
         world.groups.extend(self.groups.iter().filter_map(Group::frame));
-        world.top.rebuild(top, &world.groups);
         for actor in &mut self.actors {
             actor.previous = None;
         }
+    }
+}
+
+impl Stage {
+    /// Makes the level over the groups of `world`, unless it is that of these very boxes; true when it did.
+    pub(super) fn cover(&self, world: &mut World, top: TopKind) -> bool {
+        world.top.follow(top, &world.groups, self.boxes_version)
     }
 }
 

@@ -13,7 +13,7 @@ impl Report {
             let _ = write!(out, "\n{paragraph}\n");
         }
         out += &self.bounds();
-        for table in &self.tables {
+        for table in self.tables.iter().filter(|t| !t.json_only) {
             out += &format_table(table);
         }
         if !self.plots.is_empty() {

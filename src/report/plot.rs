@@ -70,6 +70,17 @@ pub struct Lines {
     pub lines: Vec<Line>,
 }
 
+/// Lines over a number that is counted, upward on a logarithmic axis; points have no marks.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Series {
+    /// What runs to the right, with its unit.
+    pub x: String,
+    /// What runs upward, with its unit.
+    pub y: String,
+    /// The lines.
+    pub lines: Vec<Line>,
+}
+
 /// Values by group: a mark each, on a logarithmic axis.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Bars {
@@ -110,6 +121,8 @@ pub struct Scatter {
 pub enum Chart {
     /// Growth over a number.
     Lines(Lines),
+    /// Change from one to the next.
+    Series(Series),
     /// Values side by side.
     Bars(Bars),
     /// Cost against error.
@@ -153,6 +166,7 @@ impl Plot {
             let root = SVGBackend::with_string(&mut svg, SIZE).into_drawing_area();
             match &self.chart {
                 Chart::Lines(lines) => draw_lines(&root, &self.title, lines),
+                Chart::Series(series) => draw_series(&root, &self.title, series),
                 Chart::Bars(bars) => draw_bars(&root, &self.title, bars),
                 Chart::Scatter(scatter) => draw_scatter(&root, &self.title, scatter),
             }
@@ -186,6 +200,33 @@ fn draw_lines(root: &Area<'_>, title: &str, lines: &Lines) -> Result<(), Failed>
         let points = line.points.iter().copied().filter(|p| drawable(p.0) && drawable(p.1)).collect::<Vec<_>>();
         chart.draw_series(LineSeries::new(points.iter().copied(), color(line).stroke_width(2)))?;
         mark(&plot, &chart, line, &points)?;
+    }
+    Ok(())
+}
+
+fn draw_series(root: &Area<'_>, title: &str, series: &Series) -> Result<(), Failed> {
+    let y = decades(&series.lines, |p| p.1);
+    let last = series.lines.iter().flat_map(|l| &l.points).map(|p| p.0).fold(1.0, f64::max);
+    let plot = begin(root, title, &series.lines)?;
+    let mut chart = ChartBuilder::on(&plot)
+        .margin(8)
+        .x_label_area_size(BELOW)
+        .y_label_area_size(LEFT)
+        .build_cartesian_2d(0.0..last, (y.0..y.1).log_scale())?;
+    chart
+        .configure_mesh()
+        .x_desc(&series.x)
+        .y_desc(&series.y)
+        .x_label_formatter(&|x| short(*x))
+        .y_label_formatter(&|y| short(*y))
+        .bold_line_style(GRID)
+        .light_line_style(TRANSPARENT)
+        .axis_style(FRAME)
+        .label_style(("sans-serif", 13))
+        .draw()?;
+    for line in &series.lines {
+        let points = line.points.iter().copied().filter(|p| p.0.is_finite() && drawable(p.1));
+        chart.draw_series(LineSeries::new(points, color(line).stroke_width(2)))?;
     }
     Ok(())
 }

@@ -13,7 +13,7 @@ use crate::{
 const BACK: DVec3 = DVec3::new(0.45, 0.35, 1.0);
 
 /// Where the light is, in radii of the scene from its middle.
-const LIGHT: DVec3 = DVec3::new(-1.2, 2.4, 1.5);
+pub(super) const LIGHT: DVec3 = DVec3::new(-1.2, 2.4, 1.5);
 
 /// How far ambient-occlusion rays reach, in radii of the scene.
 const AO_REACH: f64 = 0.4;
@@ -74,6 +74,13 @@ impl Sphere {
         let radius = 0.5 * (max - min).length();
         (!bounds.is_empty() && radius.is_finite())
             .then(|| Self { center: 0.5 * (min + max), radius: radius.max(1e-30) })
+    }
+}
+
+impl Sphere {
+    /// A point given in radii from the middle.
+    pub(super) fn beside(self, radii: DVec3) -> DVec3 {
+        self.center + radii * self.radius
     }
 }
 
@@ -156,7 +163,7 @@ fn facing(prims: &Triangles<'_>, prim: PrimId, dir: Vec3) -> Option<DVec3> {
 }
 
 /// A direction about `normal` with density in proportion to the cosine: the normal and a point of the unit sphere.
-fn cosine(normal: DVec3, random: &mut Random) -> DVec3 {
+pub(super) fn cosine(normal: DVec3, random: &mut Random) -> DVec3 {
     loop {
         let point = DVec3::new(random.unit(), random.unit(), random.unit()) * 2.0 - DVec3::ONE;
         let length = point.length();

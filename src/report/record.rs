@@ -16,19 +16,22 @@ pub enum Kind {
     Papers,
     /// Every acceleration structure on every scene.
     Structures,
+    /// Policies of the frame loop, frame by frame.
+    Frames,
     /// Speed against error.
     Accuracy,
 }
 
 impl Kind {
     /// The reports that exist.
-    pub const ALL: [Self; 3] = [Self::Papers, Self::Structures, Self::Accuracy];
+    pub const ALL: [Self; 4] = [Self::Papers, Self::Structures, Self::Frames, Self::Accuracy];
 
     /// Name on the command line and of the files.
     pub fn name(self) -> &'static str {
         match self {
             Self::Papers => "papers",
             Self::Structures => "structures",
+            Self::Frames => "frames",
             Self::Accuracy => "accuracy",
         }
     }

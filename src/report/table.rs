@@ -129,18 +129,27 @@ pub struct Table {
     pub columns: &'static [Column],
     /// A cell a column.
     pub rows: Vec<Vec<Cell>>,
+    /// True for rows too many to read: Markdown leaves the table out.
+    pub json_only: bool,
 }
 
 impl Table {
     /// A table without rows.
     pub fn new(name: &'static str, title: impl Into<String>, columns: &'static [Column]) -> Self {
-        Self { name, title: title.into(), notes: Vec::new(), columns, rows: Vec::new() }
+        Self { name, title: title.into(), notes: Vec::new(), columns, rows: Vec::new(), json_only: false }
     }
 
     /// Adds a paragraph above the rows.
     #[must_use]
     pub fn with_note(mut self, note: impl Into<String>) -> Self {
         self.notes.push(note.into());
+        self
+    }
+
+    /// Keeps the table out of the Markdown.
+    #[must_use]
+    pub fn in_json_only(mut self) -> Self {
+        self.json_only = true;
         self
     }
 

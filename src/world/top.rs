@@ -11,7 +11,7 @@ use super::{
 };
 use crate::accel::{
     SpecError, TravRay,
-    events::{EventRay, FlatLists, FlatWalk},
+    events::{EventRay, FlatLists, FlatWalk, Inversions},
 };
 
 /// Up to this many groups are tested one by one and sorted by entry: a tree over so few costs more than it saves.
@@ -59,12 +59,36 @@ pub(crate) struct Top {
     kind: TopKind,
     tree: TopTree,
     lists: FlatLists,
+    /// The version of the boxes that it was made of; 0 for none.
+    version: u64,
+    inversions: Inversions,
 }
 
 impl Top {
+    /// As [`Top::rebuild`] unless `version`, which names the boxes and is not 0, is that of the last time; true when it did.
+    pub(crate) fn follow(&mut self, kind: TopKind, groups: &[GroupFrame], version: u64) -> bool {
+        if self.version == version && self.kind == kind {
+            self.inversions = Inversions::default();
+            return false;
+        }
+        self.rebuild(kind, groups);
+        self.version = version;
+        true
+    }
+
+    /// What it took to sort event lists the last time; zero when there are none.
+    pub(crate) fn inversions(&self) -> Inversions {
+        self.inversions
+    }
+
+    /// True when there are event lists.
+    pub(crate) fn has_events(&self) -> bool {
+        self.lists.len() > 0
+    }
+
     /// Prepares for `groups`. No allocation when there were as many groups before.
     pub(crate) fn rebuild(&mut self, kind: TopKind, groups: &[GroupFrame]) {
-        self.kind = kind;
+        (self.kind, self.version, self.inversions) = (kind, 0, Inversions::default());
         self.tree.clear();
         if kind == TopKind::Bvh2 && groups.len() > FLAT {
             self.tree.build(groups.iter().map(|g| g.bounds));
@@ -78,7 +102,7 @@ impl Top {
     fn sort_events(&mut self, groups: &[GroupFrame]) {
         let bounds = |number: u32| groups[number as usize].bounds;
         if self.lists.len() == groups.len() {
-            self.lists.refit(bounds);
+            self.inversions = self.lists.refit(bounds);
         } else {
             self.lists.rebuild(groups.len() as u32, bounds);
         }

@@ -1,6 +1,7 @@
 //! `kinora report`: measurements with tables and plots.
 
 mod monitor;
+mod plays;
 
 use std::{
     fmt::Write,
@@ -11,11 +12,13 @@ use std::{
 use clap::Args;
 use kinora::{
     accel::AccelSpec,
+    dynamics::RebuildPolicy,
     output::{Unfinished, atomic},
     report::{
         Kind, Report, ReportError, Subject,
         accuracy::{self, Source},
         baseline::{Baseline, Changes},
+        frames::{self, Play},
         papers, structures,
     },
 };
@@ -30,7 +33,8 @@ pub(crate) struct ReportArgs {
     #[arg(value_name = "KIND", value_parser = values::report())]
     kind: Kind,
     /// Scenes or meshes (.gltf, .glb, builtin:NAME, .tris, .ply, .obj, .stl). Without any, `structures` takes the built-in scenes, generated
-    /// meshes and growth over the number of triangles; `accuracy` takes the built-in scenes and closed meshes. For `papers` they take the places of the papers' models; without any, models are
+    /// meshes and growth over the number of triangles; `accuracy` takes the built-in scenes and closed meshes; `frames` the built-in scenes, a burst
+    /// and a crowd; a folder of frame_*.tris, or several .tris of one folder, is a sequence to it. For `papers` they take the places of the papers' models; without any, models are
     /// looked for in ../shared/assets/meshes, and generated scenes stand in for the rest
     #[arg(value_name = "SCENE")]
     scenes: Vec<String>,
@@ -40,6 +44,9 @@ pub(crate) struct ReportArgs {
     /// Fewer rays, repeats and sizes: under a minute on two cores
     #[arg(long)]
     quick: bool,
+    /// Policies that `frames` compares, by commas: refit, rebuild, async, swap-every=K [default: rebuild,refit,async]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::policy)]
+    policy: Vec<RebuildPolicy>,
     /// End with exit code 1 when a stated bound or target is missed, naming which
     #[arg(long)]
     check: bool,
@@ -78,6 +85,7 @@ pub(crate) fn run(args: &ReportArgs, settings: &Settings) -> Result<(), CliError
 enum Inputs {
     Subjects(Vec<Subject>),
     Sources(Vec<Source>),
+    Plays(Vec<Play>),
 }
 
 impl Inputs {
@@ -87,6 +95,7 @@ impl Inputs {
         Ok(match kind {
             Kind::Papers | Kind::Structures => Self::Subjects(subjects()?),
             Kind::Accuracy => Self::Sources(sources()?),
+            Kind::Frames => Self::Plays(plays::read(scenes, settings)?),
         })
     }
 }
@@ -99,6 +108,19 @@ fn measure(
 ) -> Result<Report, ReportError> {
     let asked = settings.accel.parse::<AccelSpec>().ok();
     match inputs {
+        Inputs::Plays(plays) => {
+            let policies =
+                if args.policy.is_empty() { frames::Options::POLICIES.to_vec() } else { args.policy.clone() };
+            let options = frames::Options {
+                quick: args.quick,
+                simd: settings.simd,
+                accel: settings.accel.clone(),
+                top: settings.top.clone(),
+                policies,
+                pool: Arc::clone(&settings.pool),
+            };
+            frames::report(plays, &options, watching)
+        }
         Inputs::Sources(sources) => {
             let mut options = accuracy::Options { simd: settings.simd, ..accuracy::Options::new(args.quick) };
             options.specs.extend(asked.filter(|spec| !options.specs.contains(spec)));
