@@ -163,7 +163,27 @@ fn accuracy_sets_speed_against_error_and_conservative_points_err_never() {
     let best: Vec<&Value> = of("pareto").filter(|r| r["non_dominated"] == true).collect();
     assert!(!best.is_empty() && best.len() < of("pareto").count());
     assert!(of("bounds").count() > 1);
-    assert!(fs::read_to_string(out.join("accuracy.md")).expect("written").contains("lossy"));
+    let exact: Vec<&Value> = of("contacts").filter(|r| r["kind"] == "exact").collect();
+    for question in
+        ["triangles_meet", "triangle_contact", "triangle_meets_box", "boxes_meet", "box_pairs", "sweep_box", "ray_box"]
+    {
+        assert!(
+            exact.iter().any(|r| r["question"] == question && r["missed"] == 0 && r["false_contacts"] == 0),
+            "{question}"
+        );
+    }
+    assert!(of("contacts").any(|r| r["kind"] == "conservative" && r["missed"] == 0 && r["late"] == 0));
+    assert!(of("contacts").any(|r| r["kind"] == "lossy" && r["error"].as_f64() > Some(0.0)));
+    for row in of("points") {
+        assert!(row["relative"].as_f64() > Some(0.0) && row["missed_below"].as_f64() > Some(0.0), "{row}");
+    }
+    assert!(of("hard").count() > 1 && of("left_out").all(|r| r["feature"].is_string()));
+    let page = fs::read_to_string(out.join("accuracy.md")).expect("written");
+    assert!(
+        page.contains("lossy") && page.contains("## Collision") && page.contains("`rays`, ") && page.len() < 60_000,
+        "{}",
+        page.len()
+    );
 }
 
 #[test]

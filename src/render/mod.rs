@@ -33,6 +33,7 @@ mod rays;
 mod renderer;
 mod shade;
 mod sky;
+mod starts;
 mod surface;
 mod texture;
 mod tile;
@@ -43,6 +44,7 @@ mod wide;
 pub use camera::CameraView;
 pub use film::Film;
 pub use renderer::Renderer;
+pub(crate) use starts::{Leaving, starts};
 
 use crate::simd::{FloatModeError, SimdLevel};
 

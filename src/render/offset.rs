@@ -2,13 +2,19 @@
 
 use super::wide::{Floats, V3, row};
 
+/// Where rays along `dir` leave `point` of surfaces with unit normals `n_geom` of either side.
+#[inline(always)]
+pub(crate) fn off_surface<F: Floats>(point: V3<F>, n_geom: V3<F>, dir: V3<F>) -> V3<F> {
+    pushed(point, V3::select(dir.dot(n_geom).lt(F::splat(0.0)), -n_geom, n_geom))
+}
+
 /// A fixed number of floats in the direction of `away` (of unit length), by its share on each axis; a fixed distance on axes where the point is
 /// near 0 and floats are dense. Too short for points whose coordinates came from much larger ones, too long where a scene is small.
 ///
 /// # Source
 /// Wächter and Binder, "A Fast and Robust Method for Avoiding Self-Intersection", Ray Tracing Gems, 2019.
 #[inline(always)]
-pub(crate) fn pushed<F: Floats>(point: V3<F>, away: V3<F>) -> V3<F> {
+fn pushed<F: Floats>(point: V3<F>, away: V3<F>) -> V3<F> {
     V3 { x: pushed_axis(point.x, away.x), y: pushed_axis(point.y, away.y), z: pushed_axis(point.z, away.z) }
 }
 

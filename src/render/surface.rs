@@ -7,7 +7,7 @@ use super::{
     departure::Departure,
     found::{Maps, Placed, Spots},
     material::Channel,
-    offset::pushed,
+    offset::off_surface,
     patch::Patch,
     wide::{Floats, V3},
 };
@@ -77,8 +77,7 @@ impl<'p, F: Floats> Surface<'p, F> {
         if let Some(departure) = &self.departure {
             return departure.origin(self.n_geom, dir);
         }
-        let away = V3::select(dir.dot(self.n_geom).lt(F::splat(0.0)), -self.n_geom, self.n_geom);
-        pushed(self.point, away)
+        off_surface(self.point, self.n_geom, dir)
     }
 
     /// [`Surface::origin`] for shadow rays: lifted to the smooth surface, so that facets do not shadow themselves.

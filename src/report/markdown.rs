@@ -16,11 +16,32 @@ impl Report {
         for table in self.tables.iter().filter(|t| !t.json_only) {
             out += &format_table(table);
         }
+        out += &self.elsewhere();
         if !self.plots.is_empty() {
             out += "\n## Plots\n";
             for plot in &self.plots {
                 let _ = write!(out, "\n![{}]({})\n", plot.title, plot.file());
             }
+        }
+        out
+    }
+
+    /// Names the tables that are in JSON only.
+    fn elsewhere(&self) -> String {
+        let tables: Vec<&Table> = self.tables.iter().filter(|t| t.json_only).collect();
+        if tables.is_empty() {
+            return String::new();
+        }
+        let mut out = format!("\n## In `{}.json`\n\n", self.kind.name());
+        for table in tables {
+            let _ = writeln!(
+                out,
+                "- `{}`, {} rows: {}. {}",
+                table.name,
+                table.rows.len(),
+                table.title,
+                table.notes.join(" ")
+            );
         }
         out
     }
@@ -97,7 +118,7 @@ fn number(x: f64, digits: usize) -> String {
 }
 
 /// Thousands apart from 10,000 on.
-fn grouped(n: u64) -> String {
+pub(super) fn grouped(n: u64) -> String {
     let digits = n.to_string();
     if n < 10_000 {
         return digits;

@@ -11,6 +11,7 @@ pub mod closed;
 mod date;
 mod error;
 pub mod frames;
+mod labels;
 mod machine;
 mod markdown;
 pub mod measure;
@@ -25,6 +26,8 @@ pub mod reference;
 pub mod structures;
 mod subject;
 mod table;
+
+use markdown::grouped;
 
 pub use check::{Bound, Check};
 pub use error::ReportError;

@@ -10,7 +10,7 @@ use plotters::{
     style::text_anchor::{HPos, Pos, VPos},
 };
 
-use super::ReportError;
+use super::{ReportError, labels::Labels};
 
 /// Size of a plot in pixels, and of its strips at the left, below and at the right.
 const SIZE: (u32, u32) = (900, 520);
@@ -300,17 +300,22 @@ fn draw_scatter(root: &Area<'_>, title: &str, scatter: &Scatter) -> Result<(), F
         let at = (px - origin.0, py - origin.1);
         draw_mark_in(&plot, dot.mark, if dot.is_best { COLORS[dot.mark % 2] } else { DOMINATED }, at)?;
     }
-    // Names stand apart where points are close together.
-    let mut taken: Vec<(i32, i32)> = Vec::new();
+    let (width, height) = plot.dim_in_pixel();
+    let in_pixels = |at: &(f64, f64)| {
+        let (x, y) = chart.backend_coord(at);
+        (x - origin.0, y - origin.1)
+    };
+    // Above the numbers of the x axis; the strip of the legend is free but for its top.
+    #[expect(clippy::cast_possible_wrap, reason = "a picture's size")]
+    let size = (width as i32, (height - BELOW) as i32);
+    let mut labels = Labels::new(size, points(false).chain(points(true)).map(|(_, at)| in_pixels(&at)));
     for (dot, at) in points(true) {
-        let (px, py) = chart.backend_coord(&at);
-        let (tx, mut ty) = (px - origin.0 + 8, py - origin.1);
-        while taken.iter().any(|t| (t.0 - tx).abs() < 200 && (t.1 - ty).abs() < 13) {
-            ty -= 13;
+        let label = labels.place(&dot.name, in_pixels(&at));
+        if let Some(from) = label.from {
+            plot.draw(&PathElement::new(vec![from, in_pixels(&at)], DOMINATED.stroke_width(1)))?;
         }
-        taken.push((tx, ty));
         let style = ("sans-serif", 12).into_font().color(&FRAME).pos(Pos::new(HPos::Left, VPos::Center));
-        plot.draw(&Text::new(dot.name.clone(), (tx, ty), style))?;
+        plot.draw(&Text::new(dot.name.clone(), label.at, style))?;
     }
     Ok(())
 }
@@ -440,7 +445,7 @@ mod tests {
             vec![dot("best", (10.0, 0.0), true), dot("beaten", (30.0, 5.0), false), dot("cheap", (9.0, 70.0), true)];
         let svg = Plot::new("p", "t", Chart::Scatter(Scatter { x: "ns".into(), y: "u".into(), dots })).svg().unwrap();
         assert!(svg.contains("best") && svg.contains("cheap") && !svg.contains("beaten"));
-        // The point, and its line in the legend.
+        // The point, and its line in the legend; names stand beside their points, so no line leads to them.
         assert_eq!(svg.matches("#B9B9B9").count(), 2);
         assert!(!svg.contains("NaN") && !svg.contains("inf"));
     }

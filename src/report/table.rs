@@ -129,7 +129,7 @@ pub struct Table {
     pub columns: &'static [Column],
     /// A cell a column.
     pub rows: Vec<Vec<Cell>>,
-    /// True for rows too many to read: Markdown leaves the table out.
+    /// True for rows too many to read: Markdown says where they are.
     pub json_only: bool,
 }
 
@@ -146,7 +146,7 @@ impl Table {
         self
     }
 
-    /// Keeps the table out of the Markdown.
+    /// Leaves the rows to JSON.
     #[must_use]
     pub fn in_json_only(mut self) -> Self {
         self.json_only = true;

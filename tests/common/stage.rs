@@ -82,14 +82,12 @@ impl Stage {
     }
 
     pub fn world_with(self, accel: &str) -> Arc<World> {
+        self.world_as(accel, Forms::EXACT)
+    }
+
+    pub fn world_as(self, accel: &str, forms: Forms) -> Arc<World> {
         let pool = Arc::new(rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap());
-        let config = FrameConfig {
-            accel: accel.into(),
-            top: "bvh2".into(),
-            policy: RebuildPolicy::Refit,
-            forms: Forms::EXACT,
-            pool,
-        };
+        let config = FrameConfig { accel: accel.into(), top: "bvh2".into(), policy: RebuildPolicy::Refit, forms, pool };
         let mut frames = FrameLoop::new(config).unwrap();
         frames.add(Arc::new(self.scene), DAffine3::IDENTITY);
         frames.advance(&[&[]]).unwrap().0

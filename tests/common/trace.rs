@@ -10,7 +10,7 @@
 
 use kinora::{
     accel::{AnyAccel, PACKET},
-    geom::{Hit, PrimId, Ray, Triangles},
+    geom::{Forms, Hit, PrimId, Ray, Triangles},
     glam::Vec3,
     simd::SimdLevel,
 };
@@ -47,8 +47,19 @@ impl Mesh {
 
 /// The closest hit of every ray.
 pub(crate) fn closest(accel: &AnyAccel, prims: &Triangles<'_>, rays: &[Ray], level: SimdLevel) -> Vec<Option<Hit>> {
+    closest_as(accel, prims, rays, level, Forms::EXACT)
+}
+
+/// The closest hit of every ray, in these forms.
+pub(crate) fn closest_as(
+    accel: &AnyAccel,
+    prims: &Triangles<'_>,
+    rays: &[Ray],
+    level: SimdLevel,
+    forms: Forms,
+) -> Vec<Option<Hit>> {
     let mut hits = vec![None; rays.len()];
-    accel.closest_hits(prims, rays, 1, level, &mut hits).expect(MODE);
+    accel.closest_hits_as(prims, rays, 1, level, forms, &mut hits).expect(MODE);
     hits
 }
 

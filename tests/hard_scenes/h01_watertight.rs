@@ -28,7 +28,7 @@ pub(crate) fn from_inside(mesh: &Mesh, first: usize, len: usize) -> Vec<Ray> {
 fn h01_no_ray_leaks_from_a_closed_sphere() {
     let levels = count(7, 5, 2) as u32;
     let mesh = icosphere(levels);
-    let trial = Trial { name: "H1", mesh: &mesh, rays: count(10_000_000, 60_000, 300), refitted: true };
+    let trial = Trial { name: "H1", mesh: &mesh, rays: count(10_000_000, 40_000, 300), refitted: true };
     for (name, found) in trial.run(|first, len| from_inside(&mesh, first, len)) {
         assert_eq!(found.hits, found.rays, "{name}: a closed mesh is met from inside");
     }

@@ -47,7 +47,7 @@ fn tiny_rays(n: usize, first: usize, len: usize) -> Vec<Ray> {
 fn h02_rays_with_zero_and_denormal_components_are_answered_exactly() {
     let n = count(6, 6, 2) as u32;
     let mesh = lattice(n);
-    let trial = Trial { name: "H2", mesh: &mesh, rays: count(100_000, 8_000, 200), refitted: true };
+    let trial = Trial { name: "H2", mesh: &mesh, rays: count(1_000_000, 8_000, 200), refitted: true };
     let results = trial.run(|first, len| tiny_rays(n as usize, first, len));
     assert!(results.iter().all(|(_, found)| found.hits > found.rays / 4 && found.hits < found.rays));
 }

@@ -49,7 +49,7 @@ fn rays(mesh: &Mesh, small: usize, size: f32, first: usize, len: usize) -> Vec<R
 #[test]
 fn h04_a_teapot_in_a_stadium_is_answered_exactly() {
     let (mesh, small) = teapot_in_stadium(count(12, 6, 2) as u32);
-    let trial = Trial { name: "H4, stadium", mesh: &mesh, rays: count(200_000, 10_000, 60), refitted: true };
+    let trial = Trial { name: "H4 stadium", mesh: &mesh, rays: count(1_000_000, 5_000, 60), refitted: true };
     trial.run(|first, len| rays(&mesh, small, STADIUM, first, len));
 }
 
@@ -57,6 +57,6 @@ fn h04_a_teapot_in_a_stadium_is_answered_exactly() {
 fn h04_a_tree_on_its_field_is_answered_exactly() {
     let mesh = builtin_mesh(if count(2, 1, 0) == 2 { "spd-tree" } else { "spd-tree:4" });
     let small = mesh.indices.len();
-    let trial = Trial { name: "H4, tree", mesh: &mesh, rays: count(200_000, 10_000, 60), refitted: true };
+    let trial = Trial { name: "H4 tree", mesh: &mesh, rays: count(1_000_000, 5_000, 60), refitted: true };
     trial.run(|first, len| rays(&mesh, small, 100.0, first, len));
 }

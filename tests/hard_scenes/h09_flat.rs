@@ -51,9 +51,9 @@ fn rays(size: f32, first: usize, len: usize) -> Vec<Ray> {
 
 #[test]
 fn h09_plates_on_the_planes_of_the_structures_are_answered_exactly() {
-    for (name, n, size) in [("H9, plates of 16", 16, 16.0), ("H9, plates of 12", 12, 0.75)] {
+    for (name, n, size) in [("H9 plates, 16", 16, 16.0), ("H9 plates, 12", 12, 0.75)] {
         let mesh = plates(n, size);
-        let trial = Trial { name, mesh: &mesh, rays: count(50_000, 4_000, 60), refitted: true };
+        let trial = Trial { name, mesh: &mesh, rays: count(500_000, 4_000, 60), refitted: true };
         trial.run(|first, len| rays(size, first, len));
     }
 }
@@ -61,7 +61,7 @@ fn h09_plates_on_the_planes_of_the_structures_are_answered_exactly() {
 #[test]
 fn h09_a_single_plate_without_depth_is_answered_exactly() {
     let mesh = plane(8);
-    let trial = Trial { name: "H9, one plate", mesh: &mesh, rays: count(50_000, 4_000, 60), refitted: true };
+    let trial = Trial { name: "H9 plate", mesh: &mesh, rays: count(500_000, 4_000, 60), refitted: true };
     trial.run(|first, len| {
         let mut rays = rays(2.0, first, len);
         for ray in &mut rays {
@@ -75,7 +75,7 @@ fn h09_a_single_plate_without_depth_is_answered_exactly() {
 fn h09_gears_are_answered_exactly() {
     let mesh = builtin_mesh(if count(2, 1, 0) == 2 { "spd-gears" } else { "spd-gears:1" });
     let bounds = kinora::geom::Aabb::from_points(mesh.positions.iter().copied());
-    let trial = Trial { name: "H9, gears", mesh: &mesh, rays: count(100_000, 5_000, 50), refitted: true };
+    let trial = Trial { name: "H9 gears", mesh: &mesh, rays: count(500_000, 5_000, 50), refitted: true };
     trial.run(|first, len| {
         let ray = |i: usize| {
             let mut random = Random(i as u64);

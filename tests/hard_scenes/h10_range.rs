@@ -57,8 +57,8 @@ fn h10_tiny_and_huge_coordinates_are_answered_exactly_in_sound_bounds() {
     for factor in FACTORS {
         let mesh = mapped(&shapes(), |p| p * factor);
         assert!(mesh.positions.iter().all(|p| p.is_finite()));
-        let name = format!("H10, {factor:e}");
-        let trial = Trial { name: &name, mesh: &mesh, rays: count(20_000, 2_000, 30), refitted: true };
+        let name = format!("H10 {}, {factor:e}", if factor < 1.0 { "small" } else { "large" });
+        let trial = Trial { name: &name, mesh: &mesh, rays: count(100_000, 1_000, 30), refitted: true };
         trial.run(|first, len| rays(factor, first, len));
         sound(&mesh);
     }
@@ -67,7 +67,7 @@ fn h10_tiny_and_huge_coordinates_are_answered_exactly_in_sound_bounds() {
 #[test]
 fn h10_tiny_and_huge_shapes_in_one_scene_are_answered_exactly() {
     let mesh = together([mapped(&shapes(), |p| p * 1e-38), shapes(), mapped(&icosphere(2), |p| p * 1.6e38)]);
-    let trial = Trial { name: "H10, all", mesh: &mesh, rays: count(20_000, 2_000, 30), refitted: true };
+    let trial = Trial { name: "H10 all", mesh: &mesh, rays: count(100_000, 1_000, 30), refitted: true };
     trial.run(|first, len| {
         let ray = |i: usize| rays([1e-38, 1.0, 1.6e38][i % 3], i, 1)[0];
         (first..first + len).map(ray).collect()

@@ -5,6 +5,8 @@
 //! ```text
 //! KINORA_HARD_SCENES=full cargo test --release --test hard_scenes -- --nocapture --test-threads 1
 //! ```
+//!
+//! That takes hours; `KINORA_HARD_SCENES=60` takes as many of those rays as fit into 60 seconds a trial, and says how many they were.
 #![allow(
     clippy::cast_possible_truncation,
     clippy::cast_possible_wrap,
@@ -25,6 +27,7 @@ mod stage;
 #[path = "../common/trace.rs"]
 mod trace;
 
+mod fast;
 mod meshes;
 mod trial;
 

@@ -1,6 +1,9 @@
 //! Every structure on the same rays, against the reference.
 
-use std::{fmt, time::Instant};
+use std::{
+    fmt,
+    time::{Duration, Instant},
+};
 
 use kinora::{
     accel::{AccelKind, AccelSpec, AnyAccel, PACKET, Refit},
@@ -11,19 +14,33 @@ use kinora::{
 use rayon::prelude::*;
 
 use crate::{
+    fast::{FAST, check, worst},
     meshes::displaced,
     trace::{Mesh, closest, occluded},
 };
 
-/// Rays held in memory at once.
-const CHUNK: usize = 1 << 19;
+/// Rays held in memory at once, and between looks at the clock.
+const CHUNK: usize = 8 * GRAIN;
 
 /// Rays that a task of a pool takes.
-const GRAIN: usize = 1 << 12;
+const GRAIN: usize = 1 << 10;
+
+/// Of a batch that fails.
+const MODE: &str = "the default float mode";
+
+/// What `KINORA_HARD_SCENES` asks for: `full`, or full counts as far as they go in so many seconds a trial.
+fn asked() -> Option<String> {
+    std::env::var("KINORA_HARD_SCENES").ok().filter(|v| v == "full" || v.parse::<u64>().is_ok())
+}
 
 /// True when the counts that prove something are asked for.
 pub(crate) fn is_full() -> bool {
-    std::env::var_os("KINORA_HARD_SCENES").is_some_and(|v| v == "full")
+    asked().is_some()
+}
+
+/// How long the structures of a trial may take together.
+pub(crate) fn limit() -> Option<Duration> {
+    asked()?.parse().ok().map(Duration::from_secs)
 }
 
 /// How many: in full, as a share in release builds, without optimisation.
@@ -72,6 +89,14 @@ impl Mistakes {
         }
     }
 
+    /// Only missed and false blockers are told apart.
+    fn add_blocked(&mut self, due: bool, found: bool) {
+        self.rays += 1;
+        self.hits += u64::from(due);
+        self.false_misses += u64::from(due && !found);
+        self.false_hits += u64::from(!due && found);
+    }
+
     fn sum(self, other: Self) -> Self {
         Self {
             rays: self.rays + other.rays,
@@ -91,6 +116,23 @@ impl fmt::Display for Mistakes {
         let worst = wilson(false_misses + false_hits + wrong, *rays).1 * 1e9;
         write!(f, "{rays} rays, {hits} meet something: {false_misses} missed, {false_hits} false, {wrong} wrong, ")?;
         write!(f, "{inexact} inexact, {occlusions} occlusions otherwise; below {worst:.0} in 10^9 at 95 %")
+    }
+}
+
+/// How fast is asked.
+const FAST_ASKED: [&str; 3] = ["alone", "in packets", "for occlusion"];
+
+/// What a structure came to in both precisions.
+#[derive(Clone, Copy, Debug, Default)]
+struct Found {
+    exact: Mistakes,
+    /// As [`FAST_ASKED`].
+    fast: [Mistakes; 3],
+}
+
+impl Found {
+    fn sum(self, other: Self) -> Self {
+        Self { exact: self.exact.sum(other.exact), fast: std::array::from_fn(|i| self.fast[i].sum(other.fast[i])) }
     }
 }
 
@@ -149,51 +191,76 @@ pub(crate) struct Trial<'a> {
 
 impl Trial<'_> {
     /// Every structure gives the reference's answer on every ray: the triangle, and t, u, v correctly rounded; on shares of the rays
-    /// (all of the first 4096) also in packets, at every SIMD level, and for occlusion. `rays` makes so many of them from a number on.
+    /// (all of the first 1024) also in packets, at every SIMD level, and for occlusion. In fast, what is listed may be missed. `rays` makes so
+    /// many of them from a number on. Returns what exact answers came to. Where the time is limited, structures end when
+    /// theirs is over: the counts say how many rays they took.
     ///
     /// # Panics
     /// Where one does not; all counts are printed first.
     pub(crate) fn run(self, rays: impl Fn(usize, usize) -> Vec<Ray>) -> Vec<(String, Mistakes)> {
         let reference = Reference::new(&self.mesh.prims());
         let candidates = candidates(self.mesh, self.refitted);
-        let mut found = vec![Mistakes::default(); candidates.len()];
+        let mut found = vec![Found::default(); candidates.len()];
         let mut seconds = vec![0.0; candidates.len()];
+        // Each structure has its share of the time.
+        let most = limit().map_or(f64::INFINITY, |l| l.as_secs_f64() / candidates.len() as f64);
         for first in (0..self.rays).step_by(CHUNK) {
+            if seconds.iter().all(|&s| s > most) {
+                break;
+            }
             let rays = rays(first, CHUNK.min(self.rays - first));
             let truths = reference.all_closest(&rays);
             for ((candidate, found), seconds) in candidates.iter().zip(&mut found).zip(&mut seconds) {
-                let begun = Instant::now();
-                *found = found.sum(self.answers(candidate, &rays, &truths));
-                *seconds += begun.elapsed().as_secs_f64();
+                if *seconds <= most {
+                    let begun = Instant::now();
+                    *found = found.sum(self.answers(candidate, first, &rays, &truths));
+                    *seconds += begun.elapsed().as_secs_f64();
+                }
             }
         }
-        let results: Vec<_> = candidates.into_iter().map(|c| c.name).zip(found).collect();
-        for ((name, found), seconds) in results.iter().zip(seconds) {
-            println!("{}: {name}: {found} ({:.0} ns a ray)", self.name, seconds * 1e9 / found.rays.max(1) as f64);
+        let all = || candidates.iter().map(|c| c.name.as_str()).zip(&found);
+        for ((name, found), seconds) in all().zip(seconds) {
+            let Found { exact, fast } = found;
+            println!(
+                "{}: {name}: {exact} ({:.0} ns a ray, all asked)",
+                self.name,
+                seconds * 1e9 / exact.rays.max(1) as f64
+            );
+            for (how, fast) in FAST_ASKED.iter().zip(fast) {
+                println!("{}: {name}, fast, {how}: {fast}", self.name);
+            }
         }
-        for (name, found) in &results {
-            assert!(found.none(), "{}: {name}: {found}", self.name);
+        let fast = all().flat_map(|(name, found)| found.fast.iter().map(move |fast| (name, fast)));
+        println!("{}: fast, the worst of all: {}", self.name, worst(fast.clone()));
+        for (name, Found { exact, .. }) in all() {
+            assert!(exact.none(), "{}: {name}: {exact}", self.name);
         }
-        results
+        fast.for_each(|(name, fast)| check(self.name, name, fast));
+        candidates.iter().map(|c| c.name.clone()).zip(found.iter().map(|f| f.exact)).collect()
     }
 
-    fn answers(&self, candidate: &Candidate, rays: &[Ray], truths: &[Option<Truth>]) -> Mistakes {
+    /// On rays from number `first` on.
+    fn answers(&self, candidate: &Candidate, first: usize, rays: &[Ray], truths: &[Option<Truth>]) -> Found {
         // Slow structures take every so many rays.
-        let budget = count(1_000_000_000, 5_000_000, 600_000);
+        let budget = count(1_000_000_000, 2_000_000, 600_000);
         // The flat lists handle an event where `list` tests a triangle, which takes longer.
         let budget = if candidate.kind == AccelKind::List { budget } else { budget / 30 };
         let most = if candidate.slow { (budget / self.mesh.indices.len().max(1)).max(1) } else { self.rays };
         let step = self.rays.div_ceil(most);
-        let picked: Vec<_> = (0..rays.len()).step_by(step).collect();
+        let picked: Vec<_> = (0..rays.len()).filter(|i| (first + i).is_multiple_of(step)).collect();
         let (rays, truths): (Vec<Ray>, Vec<&Option<Truth>>) = picked.iter().map(|&i| (rays[i], &truths[i])).unzip();
         rays.par_chunks(GRAIN)
             .zip(truths.par_chunks(GRAIN))
             .enumerate()
-            .map(|(number, (rays, truths))| self.chunk(candidate, number, rays, truths))
-            .reduce(Mistakes::default, Mistakes::sum)
+            .map(|(number, (rays, truths))| (first / GRAIN + number, (rays, truths)))
+            .map(|(number, (rays, truths))| Found {
+                exact: self.exact(candidate, number, rays, truths),
+                fast: self.fast(candidate, number, rays, truths),
+            })
+            .reduce(Found::default, Found::sum)
     }
 
-    fn chunk(&self, candidate: &Candidate, number: usize, rays: &[Ray], truths: &[&Option<Truth>]) -> Mistakes {
+    fn exact(&self, candidate: &Candidate, number: usize, rays: &[Ray], truths: &[&Option<Truth>]) -> Mistakes {
         let (accel, prims) = (&candidate.accel, self.mesh.prims());
         let mut mistakes = Mistakes::default();
         let best = closest(accel, &prims, rays, SimdLevel::best());
@@ -203,7 +270,7 @@ impl Trial<'_> {
         // Packets and occlusion on a quarter of the rays, lower levels on an eighth: they run the same tests in other orders and widths.
         if number.is_multiple_of(4) {
             let mut together = vec![None; rays.len()];
-            accel.closest_hits(&prims, rays, PACKET, SimdLevel::best(), &mut together).expect("the default float mode");
+            accel.closest_hits(&prims, rays, PACKET, SimdLevel::best(), &mut together).expect(MODE);
             mistakes.inexact += differences(&best, &together);
             for (truth, blocked) in truths.iter().zip(occluded(accel, &prims, rays, SimdLevel::best())) {
                 mistakes.occlusions += u64::from(truth.is_some() != blocked);
@@ -215,6 +282,33 @@ impl Trial<'_> {
             }
         }
         mistakes
+    }
+
+    /// All rays alone; a quarter of them in packets and for occlusion. What is found must be numbers within the ray's range.
+    fn fast(&self, candidate: &Candidate, number: usize, rays: &[Ray], truths: &[&Option<Truth>]) -> [Mistakes; 3] {
+        let (accel, prims, level) = (&candidate.accel, self.mesh.prims(), SimdLevel::best());
+        let closest = |packet: usize| {
+            let (mut mistakes, mut hits) = (Mistakes::default(), vec![None; rays.len()]);
+            accel.closest_hits_as(&prims, rays, packet, level, FAST, &mut hits).expect(MODE);
+            for ((ray, truth), hit) in rays.iter().zip(truths).zip(&hits) {
+                mistakes.add(truth.as_ref(), hit.as_ref());
+                if let Some(hit) = hit {
+                    let is_sound = hit.t >= ray.t_near && hit.t <= ray.t_far && hit.u.is_finite() && hit.v.is_finite();
+                    assert!(is_sound, "{}: {}, fast: {hit:?}", self.name, candidate.name);
+                }
+            }
+            mistakes
+        };
+        let alone = closest(1);
+        if !number.is_multiple_of(4) {
+            return [alone, Mistakes::default(), Mistakes::default()];
+        }
+        let (mut occlusion, mut blocked) = (Mistakes::default(), vec![false; rays.len()]);
+        accel.blocked_as(&prims, rays, 1, level, FAST, &mut blocked).expect(MODE);
+        for (truth, blocked) in truths.iter().zip(blocked) {
+            occlusion.add_blocked(truth.is_some(), blocked);
+        }
+        [alone, closest(PACKET), occlusion]
     }
 }
 

@@ -4,12 +4,15 @@
 //! all; lossy ones stay below stated bounds.
 
 mod bounds;
+mod contacts;
 mod flip;
+pub mod hard;
 mod images;
 mod needs;
 mod offset;
 mod pareto;
 mod point;
+mod points;
 mod quest;
 mod rays;
 mod same;
@@ -76,6 +79,7 @@ struct Rows {
     same: Vec<same::SameRow>,
     needs: Vec<needs::NeedRow>,
     offsets: Vec<offset::OffsetRow>,
+    contacts: Vec<contacts::ContactRow>,
 }
 
 impl Rows {
@@ -91,6 +95,15 @@ impl Rows {
         Ok(())
     }
 
+    /// A sentence on everything but rays.
+    fn in_short(&self) -> Vec<String> {
+        let mut out = vec![hard::in_short(), updates::in_short(&self.updates)];
+        out.extend(skin::in_short(&self.skins));
+        out.push(contacts::in_short(&self.contacts));
+        out.extend(needs::in_short(&self.needs));
+        out
+    }
+
     fn checks(&self) -> Vec<Check> {
         let mut checks = bounds::checks(&self.rays);
         checks.extend(updates::checks(&self.updates));
@@ -98,6 +111,7 @@ impl Rows {
         checks.extend(skin::checks(&self.skins));
         checks.extend(offset::checks(&self.offsets));
         checks.extend(images::checks(&self.images));
+        checks.extend(contacts::checks(&self.contacts));
         checks
     }
 
@@ -109,13 +123,18 @@ impl Rows {
     fn tables(&self) -> Vec<Table> {
         let mut tables = vec![
             bounds::table(),
-            rays::table(&self.rays),
-            updates::table(&self.updates),
+            hard::table(),
+            points::table(&points::points(&self.rays)),
+            updates::points(&self.updates),
             skin::table(&self.skins),
             images::table(&self.images),
             offset::table(&self.offsets),
-            same::table(&self.same),
+            contacts::table(&self.contacts),
+            same::points(&self.same),
             needs::table(&self.needs),
+            rays::table(&self.rays),
+            updates::table(&self.updates),
+            same::table(&self.same),
             pareto::table(&self.spots()),
         ];
         tables.retain(|t| !t.rows.is_empty());
@@ -143,9 +162,11 @@ pub fn report(sources: &[Source], options: &Options, monitor: &mut dyn Monitor) 
         rows.measure(source, options, monitor)?;
     }
     rows.offsets = offset::measure(options, monitor)?;
-    report.summary = summary::summary(&rows.rays);
+    rows.contacts = contacts::measure(options, monitor)?;
+    report.summary = summary::summary(&rows.rays, &rows.in_short());
     report.checks = rows.checks();
     report.tables = rows.tables();
-    report.plots = pareto::plots(&rows.spots());
+    report.plots = points::plots(&points::points(&rows.rays));
+    report.plots.extend(pareto::plots(&rows.spots()));
     Ok(report)
 }

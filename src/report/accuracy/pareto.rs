@@ -51,6 +51,8 @@ pub(super) struct Spot {
     forms: Forms,
     costs: Vec<Value>,
     errors: Vec<Value>,
+    /// Rays judged, or 1.
+    weight: u64,
     is_drawn: bool,
 }
 
@@ -74,6 +76,7 @@ fn of_rays(row: &RayRow) -> Option<Spot> {
         forms: row.forms,
         costs: vec![Value::new("ns a ray", row.ns()?), Value::new("bytes a triangle", row.bytes_per_triangle)],
         errors,
+        weight: e.rays,
         is_drawn: matches!(row.class, Class::Edges | Class::Inside(Aim::Edges)),
     })
 }
@@ -97,6 +100,7 @@ fn of_image(row: &ImageRow) -> Option<Spot> {
             Value::new("mean FLIP", d.flip),
             Value::new("differing pixels", d.pixels as f64),
         ],
+        weight: 1,
         is_drawn: true,
     })
 }
@@ -110,14 +114,20 @@ fn of_skin(row: &SkinRow) -> Option<Spot> {
         forms: row.forms,
         costs: vec![Value::new("ms a frame of deforming", row.deform.median()? * 1e3)],
         errors: vec![Value::new("largest error over size", row.max), Value::new("RMS error over size", row.rms)],
+        weight: 1,
         is_drawn: false,
     })
 }
 
 /// For each point (cost, error): true when no other is at least as good in both and better in one.
-fn non_dominated(points: &[(f64, f64)]) -> Vec<bool> {
+pub(super) fn non_dominated(points: &[(f64, f64)]) -> Vec<bool> {
     let beats = |a: &(f64, f64), b: &(f64, f64)| a.0 <= b.0 && a.1 <= b.1 && (a.0 < b.0 || a.1 < b.1);
     points.iter().map(|p| !points.iter().any(|q| beats(q, p))).collect()
+}
+
+/// True when a point judged enough rays to stand beside one that judged `most`: the errors of a few say little.
+pub(super) fn competes(rays: u64, most: u64) -> bool {
+    rays.saturating_mul(20) >= most
 }
 
 /// Spots that may be compared, by one cost and one error.
@@ -144,7 +154,9 @@ fn fronts(spots: &[Spot]) -> Vec<Front<'_>> {
 impl<'a> Front<'a> {
     fn new(spots: &'a [Spot], (scene, of, cost, error): (&str, &str, &str, &str)) -> Self {
         let mut front = Self { spots: Vec::new(), costs: Vec::new(), errors: Vec::new(), best: Vec::new() };
-        for s in spots.iter().filter(|s| s.scene == scene && s.of == of) {
+        let of_kind = || spots.iter().filter(|s| s.scene == scene && s.of == of);
+        let most = of_kind().map(|s| s.weight).max().unwrap_or(0);
+        for s in of_kind().filter(|s| competes(s.weight, most)) {
             let named = |values: &'a [Value], name: &str| values.iter().find(|v| v.name == name);
             if let (Some(cost), Some(error)) = (named(&s.costs, cost), named(&s.errors, error)) {
                 front.spots.push(s);
@@ -183,9 +195,9 @@ impl<'a> Front<'a> {
 
 /// All points with their marks.
 pub(super) fn table(spots: &[Spot]) -> Table {
-    let mut table = Table::new("pareto", "Which points are worth their cost", COLUMNS).with_note(
+    let mut table = Table::new("pareto", "Which points are worth their cost, by scene", COLUMNS).in_json_only().with_note(
         "A point is non-dominated when no other point of the same scene and kind costs at most as much and errs at most as much, and is better in one of both. \
-         There is no single score: a point that is dominated here may be the best by another cost or error.",
+         There is no single score: a point that is dominated here may be the best by another cost or error. Points that judged less than a twentieth of the rays are left out.",
     );
     for front in fronts(spots) {
         for (i, spot) in front.spots.iter().enumerate() {
@@ -206,10 +218,14 @@ pub(super) fn table(spots: &[Spot]) -> Table {
     table
 }
 
-/// Plots of rays at edges and of pictures, by every cost and every error that tells points apart.
+/// What is drawn by scene: the first cost of a kind against these errors.
+const DRAWN: [&str; 2] = ["wrong answers in 10^9", "mean FLIP"];
+
+/// Plots by scene, of rays at edges and of pictures, where the error tells points apart.
 pub(super) fn plots(spots: &[Spot]) -> Vec<Plot> {
     let drawn: Vec<Spot> = spots.iter().filter(|s| s.is_drawn).cloned().collect();
-    fronts(&drawn).iter().filter(|f| f.spots.len() > 2 && f.is_telling()).map(Front::plot).collect()
+    let is_asked = |f: &&Front<'_>| DRAWN.contains(&f.errors[0].name) && f.costs[0].name == f.spots[0].costs[0].name;
+    fronts(&drawn).iter().filter(is_asked).filter(|f| f.spots.len() > 2 && f.is_telling()).map(Front::plot).collect()
 }
 
 /// Letters and digits, with dashes between words.
@@ -239,6 +255,7 @@ mod tests {
             forms: Forms::EXACT,
             costs: vec![Value::new("ns", cost)],
             errors: vec![Value::new("u", error)],
+            weight: 1,
             is_drawn: true,
         };
         let spots = [

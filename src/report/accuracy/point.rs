@@ -17,14 +17,20 @@ impl Point {
         let nodes = Forms { nodes: Precision::Fast, ..exact };
         let leaves = Forms { leaves: Precision::Fast, ..exact };
         let both = Forms { nodes: Precision::Fast, ..leaves };
-        let forms = if has_fast_nodes(spec.kind()) { vec![exact, nodes, leaves, both] } else { vec![exact, leaves] };
+        let forms = if has_fast_nodes(spec) { vec![exact, nodes, leaves, both] } else { vec![exact, leaves] };
         forms.into_iter().map(|forms| Self { spec: spec.clone(), forms }).collect()
     }
 }
 
 /// True where [`Forms::nodes`] has a fast form.
-fn has_fast_nodes(kind: AccelKind) -> bool {
-    kind.name() == "bvh2"
+fn has_fast_nodes(spec: &AccelSpec) -> bool {
+    let settings = spec.to_string();
+    let has_planes = |count: &str| settings.split([':', ',']).any(|s| s == count);
+    match spec.kind() {
+        AccelKind::Bvh2 | AccelKind::Bvh8 => true,
+        AccelKind::Ssh => has_planes("planes=3") || has_planes("planes=4"),
+        _ => false,
+    }
 }
 
 /// What is left out, in words: `exact`, or the names of the fast steps.
@@ -52,5 +58,12 @@ mod tests {
             assert!(labels.contains(&"fast triangles".to_owned()), "{kind}: {labels:?}");
         }
         assert_eq!(label(Precision::Fast.into()), "fast");
+    }
+
+    #[test]
+    fn fast_nodes_are_measured_where_answers_may_depend_on_them() {
+        let has = |spec: &str| Point::all(&spec.parse().expect("a structure")).len() == 4;
+        assert!(["bvh2", "bvh8", "ssh:planes=3", "ssh:planes=4"].into_iter().all(has));
+        assert!(!["ssh", "ssh:leaf=1", "grid", "kdtree", "grug", "events", "list"].into_iter().any(has));
     }
 }

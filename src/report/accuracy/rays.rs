@@ -6,7 +6,7 @@ use super::{
     quest::{Class, Quest},
 };
 use crate::{
-    accel::{AnyAccel, PACKET},
+    accel::{AccelKind, AnyAccel, PACKET},
     geom::Forms,
     report::{
         Cell, Column, Monitor, ReportError, Role, Table,
@@ -96,6 +96,23 @@ impl Errors {
         }
     }
 
+    /// Both together; of the errors of t, the worst.
+    pub(super) fn and(self, other: &Self) -> Self {
+        let leaks = self.leaks.into_iter().chain(other.leaks).reduce(|a, b| a + b);
+        Self {
+            rays: self.rays + other.rays,
+            ties: self.ties + other.ties,
+            false_misses: self.false_misses + other.false_misses,
+            false_hits: self.false_hits + other.false_hits,
+            wrong: self.wrong + other.wrong,
+            leaks,
+            inexact: self.inexact + other.inexact,
+            lost_zeros: self.lost_zeros + other.lost_zeros,
+            uv_max: self.uv_max.max(other.uv_max),
+            t: std::array::from_fn(|i| self.t[i].into_iter().chain(other.t[i]).reduce(f64::max)),
+        }
+    }
+
     /// Answers that differ in kind.
     pub(super) fn mistakes(&self) -> u64 {
         self.false_misses + self.false_hits + self.wrong
@@ -150,7 +167,8 @@ impl RayRow {
 
 /// The rows as they are written.
 pub(super) fn table(rows: &[RayRow]) -> Table {
-    let mut table = Table::new("rays", "Rays: every structure and form", COLUMNS)
+    let mut table = Table::new("rays", "Rays: every structure and form, by scene and class of rays", COLUMNS)
+        .in_json_only()
         .with_note(
             "All points answer the same rays, and every answer is judged by `report::reference`. A conservative point takes no shortcut that \
              could change an answer; a lossy one names the steps that do. Times are processor time of one thread, medians over repeats \
@@ -264,7 +282,7 @@ fn turns<'a>(source: &'a Source, quest: &Quest, built: &'a Built, options: &Opti
 
 /// True where 16 rays are walked together.
 pub(super) fn walks_packets(accel: &AnyAccel) -> bool {
-    matches!(accel.kind().name(), "bvh2" | "ssh")
+    matches!(accel.kind(), AccelKind::Bvh2 | AccelKind::Bvh8 | AccelKind::Ssh)
 }
 
 /// How many rays cost at most `budget`, by a sample of them.

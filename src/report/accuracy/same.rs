@@ -13,6 +13,7 @@ use crate::{
     report::{
         Bound, Cell, Check, Column, Monitor, ReportError, Role, Table,
         measure::{Answer, Caster},
+        reference::wilson,
     },
     simd::SimdLevel,
 };
@@ -39,11 +40,8 @@ pub(super) struct SameRow {
 
 /// The rows as they are written.
 pub(super) fn table(rows: &[SameRow]) -> Table {
-    let mut table = Table::new("same", "Same bits: levels, packets, threads, structures", COLUMNS).with_note(
-        "Triangle, t, u and v are compared bit for bit with the answers of single rays on one thread at the report's SIMD level; for structures, with \
-         those of the first one. `exact` promises no difference anywhere; `fast` promises that for one level and structure only, so its rows show what \
-         it gives up.",
-    );
+    let note = "As `same_points`, not added up.";
+    let mut table = Table::new("same", "Same bits, by scene and structure", COLUMNS).in_json_only().with_note(note);
     for r in rows {
         table.push(vec![
             r.scene.clone().into(),
@@ -53,6 +51,39 @@ pub(super) fn table(rows: &[SameRow]) -> Table {
             r.answers.into(),
             Cell::Count(r.differences),
         ]);
+    }
+    table
+}
+
+const POINT_COLUMNS: &[Column] = &[
+    Column::new("precision", "precision", Role::Id, 0),
+    Column::new("varied", "varied", Role::Id, 0),
+    Column::new("answers", "answers compared", Role::Note, 0),
+    Column::new("differences", "differences", Role::Less, 0),
+    Column::new("below", "in 10^9, at most", Role::Note, 0),
+];
+
+/// Every precision over all scenes and structures.
+pub(super) fn points(rows: &[SameRow]) -> Table {
+    let mut table = Table::new("same_points", "Same bits: levels, packets, threads, structures", POINT_COLUMNS).with_note(
+        "Triangle, t, u and v are compared bit for bit with the answers of single rays on one thread at the report's SIMD level; for structures, with \
+         those of the first one. `exact` promises no difference anywhere; `fast` promises that for one level and structure only, so its rows show what \
+         it gives up.",
+    );
+    let mut sums: Vec<(Forms, &str, u64, u64)> = Vec::new();
+    for r in rows {
+        match sums.iter_mut().find(|s| s.0 == r.forms && s.1 == r.varied) {
+            Some((_, _, answers, differences)) => {
+                *answers += r.answers;
+                *differences += r.differences;
+            }
+            None => sums.push((r.forms, &r.varied, r.answers, r.differences)),
+        }
+    }
+    sums.sort_by_key(|s| label(s.0));
+    for (forms, varied, answers, differences) in sums {
+        let below = wilson(differences, answers).1 * 1e9;
+        table.push(vec![label(forms).into(), varied.into(), answers.into(), differences.into(), below.into()]);
     }
     table
 }

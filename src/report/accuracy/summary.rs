@@ -6,10 +6,13 @@ use super::{
     point::label,
     rays::{Errors, RayRow},
 };
-use crate::{geom::Forms, report::reference::wilson};
+use crate::{
+    geom::Forms,
+    report::{grouped, reference::wilson},
+};
 
-/// Paragraphs for a reader who knows nothing of the report.
-pub(super) fn summary(rows: &[RayRow]) -> Vec<String> {
+/// Paragraphs for a reader who knows nothing of the report; `others` are sentences on what is not rays.
+pub(super) fn summary(rows: &[RayRow], others: &[String]) -> Vec<String> {
     vec![
         "This report says what each shortcut buys and what it costs. A ray is asked what it meets first. In `exact` precision the answer is \
          that of exact arithmetic, rounded once; every other precision names the steps that take a cheaper form. All of them \
@@ -18,10 +21,11 @@ pub(super) fn summary(rows: &[RayRow]) -> Vec<String> {
             .to_owned(),
         headline(rows),
         in_short(rows),
+        others.iter().map(|o| format!("- {o}")).collect::<Vec<_>>().join("\n"),
         "How to read it: *ns a ray* is the time of one thread; an answer is *wrong* when a ray misses what it should hit, hits what it should miss, or finds a \
          triangle that is not the first. No wrong answer in n rays does not mean none ever: the *at most* column is the rate that \
          a run like this rules out with 95 % confidence. Errors of t are in u = 2^-24 of t (a correct rounding errs by at most 1). \
-         The tables below give the same by scene, class of rays and structure; the plots set cost against error, points that another one \
+         The table of structures gives the same by point, over all scenes; by scene and class of rays it stands in `accuracy.json`. The plots set cost against error; points that another one \
          beats in both are grey."
             .to_owned(),
     ]
@@ -32,7 +36,7 @@ fn headline(rows: &[RayRow]) -> String {
     format!(
         "**Exact: {} wrong of {} answers** ({} structures; {} leaks of closed meshes, {} answers not correctly rounded). That bounds the true rate below {} in 10^9.",
         exact.mistakes,
-        exact.rays,
+        grouped(exact.rays),
         structures(rows),
         exact.leaks,
         exact.inexact,
@@ -69,8 +73,8 @@ fn in_short(rows: &[RayRow]) -> String {
             "\n| {} | {} | {} | {} | {} | {share:.4} | {} | {} |",
             label(forms),
             ratio(rows, forms).map_or_else(dash, |r| format!("{r:.2}")),
-            all.rays,
-            all.mistakes,
+            grouped(all.rays),
+            grouped(all.mistakes),
             in_billion(wilson(all.mistakes, all.rays).1),
             all.median.map_or_else(dash, |t| format!("{t:.2}")),
             all.max.map_or_else(dash, |t| format!("{t:.1}")),
@@ -93,9 +97,10 @@ fn ratio(rows: &[RayRow], forms: Forms) -> Option<f64> {
     ratios.get(ratios.len() / 2).copied()
 }
 
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at most 10^9")]
 fn in_billion(rate: f64) -> String {
     let n = rate * 1e9;
-    if n < 100.0 { format!("{n:.1}") } else { format!("{n:.0}") }
+    if n < 100.0 { format!("{n:.1}") } else { grouped(n.round() as u64) }
 }
 
 /// Counts of several rows together.

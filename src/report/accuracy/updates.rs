@@ -10,7 +10,7 @@ use crate::{
     geom::{Forms, Triangles},
     glam::Vec3,
     report::{
-        Bound, Cell, Check, Column, Monitor, ReportError, Role, Table,
+        Bound, Cell, Check, Column, Monitor, ReportError, Role, Table, grouped,
         measure::{Answer, Caster, Samples},
         reference::wilson,
     },
@@ -108,15 +108,91 @@ impl UpdateRow {
 
 /// The rows as they are written.
 pub(super) fn table(rows: &[UpdateRow]) -> Table {
-    let mut table = Table::new("updates", "Updates: rebuild, refit, old topology", COLUMNS).with_note(
-        "A refit keeps the tree and computes its bounds anew; however old the topology, it costs time, never answers. The motion is a frame of the scene's \
-         first clip, or everything since it began; for meshes, a wave. Exact answers after each update are compared with those of a fresh build bit for bit, and judged. Structures that cannot \
-         refit are built anew. Quality is the surface-area cost, and the nodes and triangles that rays visit, relative to a fresh build.",
-    );
+    let mut table = Table::new("updates", "Updates by scene and class of rays", COLUMNS)
+        .in_json_only()
+        .with_note("As `update_points`, not added up.");
     for row in rows {
         table.push(row.cells());
     }
     table
+}
+
+const POINT_COLUMNS: &[Column] = &[
+    Column::new("structure", "structure", Role::Id, 0),
+    Column::new("nodes", "node format", Role::Id, 0),
+    Column::new("policy", "update", Role::Id, 0),
+    Column::new("update_ratio", "update over a rebuild", Role::Sooner, 3),
+    Column::new("ray_ratio", "ray over a fresh build's", Role::Sooner, 2),
+    Column::new("visits_ratio", "visits over a fresh build's", Role::Less, 3),
+    Column::new("sah_ratio", "SAH cost over a fresh build's", Role::Less, 3),
+    Column::new("count", "rays judged", Role::Note, 0),
+    Column::new("mistakes", "wrong answers", Role::Less, 0),
+    Column::new("mistakes_below", "in 10^9, at most", Role::Note, 0),
+    Column::new("not_rounded", "not correctly rounded", Role::Less, 0),
+    Column::new("differences", "unlike a fresh build's", Role::Less, 0),
+    Column::new("violations", "bound violations", Role::Less, 0),
+];
+
+/// The geometric mean of ratios; `None` without any.
+fn mean(ratios: impl Iterator<Item = f64>) -> Option<f64> {
+    let logs: Vec<f64> = ratios.filter(|r| *r > 0.0 && r.is_finite()).map(libm::log).collect();
+    (!logs.is_empty()).then(|| libm::exp(logs.iter().sum::<f64>() / logs.len() as f64))
+}
+
+/// Every structure and policy over all scenes and rays.
+pub(super) fn points(rows: &[UpdateRow]) -> Table {
+    let mut table = Table::new("update_points", "Updates: rebuild, refit, old topology", POINT_COLUMNS).with_note(
+        "A refit keeps the tree and computes its bounds anew; however old the topology, it costs time, never answers. The motion is a frame of the scene's \
+         first clip, or everything since it began; for meshes, a wave. Exact answers after each update are compared with those of a fresh build bit for bit, and judged. Structures that cannot \
+         refit are built anew. Ratios are geometric means over scenes, of primary rays and rays at edges: what an update takes over a rebuild, what a ray takes and visits over a ray through a fresh build, \
+         and the surface-area cost. Updates take part in the exact precision, where they must not show; fast answers change with the tree.",
+    );
+    let mut groups: Vec<Vec<&UpdateRow>> = Vec::new();
+    for row in rows {
+        match groups.iter_mut().find(|g| g[0].structure == row.structure && g[0].policy == row.policy) {
+            Some(group) => group.push(row),
+            None => groups.push(vec![row]),
+        }
+    }
+    for of in groups {
+        let fresh = |r: &UpdateRow| {
+            let same = |f: &&UpdateRow| f.structure == r.structure && f.scene == r.scene && f.class == r.class;
+            rows.iter().filter(|f| f.policy == Policy::Rebuild).find(same).cloned()
+        };
+        let over = |of_row: fn(&UpdateRow) -> Option<f64>| {
+            mean(of.iter().filter_map(|r| Some(of_row(r)? / of_row(&fresh(r)?)?)))
+        };
+        let sum = |count: fn(&UpdateRow) -> u64| of.iter().map(|r| count(r)).sum::<u64>();
+        let (judged, mistakes) = (sum(|r| r.rays), sum(|r| r.mistakes));
+        table.push(vec![
+            of[0].structure.clone().into(),
+            of[0].nodes.into(),
+            of[0].policy.name().into(),
+            over(|r| r.update.median()).into(),
+            over(|r| r.seconds.median()).into(),
+            mean(of.iter().filter_map(|r| r.visits_ratio)).into(),
+            mean(of.iter().filter_map(|r| r.sah_ratio)).into(),
+            judged.into(),
+            mistakes.into(),
+            (wilson(mistakes, judged).1 * 1e9).into(),
+            sum(|r| r.inexact).into(),
+            sum(|r| r.differences).into(),
+            sum(|r| r.violations.len() as u64).into(),
+        ]);
+    }
+    table
+}
+
+/// In a sentence.
+pub(super) fn in_short(rows: &[UpdateRow]) -> String {
+    let sum = |of: fn(&UpdateRow) -> u64| grouped(rows.iter().map(of).sum());
+    format!(
+        "**Updates:** {} answers after rebuilds and refits, {} wrong, {} unlike those of a fresh build; {} bound violations.",
+        sum(|r| r.rays),
+        sum(|r| r.mistakes),
+        sum(|r| r.differences),
+        sum(|r| r.violations.len() as u64),
+    )
 }
 
 /// What updates must show.
