@@ -1,4 +1,6 @@
 //! `collide/<what>/<case>`: the primitives of collision on batches of cases, a throughput of cases; one thread.
+//!
+//! First of all, or with `peers` as the argument alone, whole scenes against parry3d, with ratios.
 #![allow(
     clippy::cast_possible_truncation,
     clippy::cast_possible_wrap,
@@ -10,12 +12,13 @@
 mod ccd;
 #[path = "../tests/common/mod.rs"]
 mod common;
+mod peers;
 #[path = "../tests/common/trace.rs"]
 mod trace;
 
 use std::hint::black_box;
 
-use criterion::{BenchmarkGroup, Criterion, Throughput, criterion_group, criterion_main, measurement::WallTime};
+use criterion::{BenchmarkGroup, Criterion, Throughput, criterion_group, measurement::WallTime};
 use kinora::{
     collide::{Continuous, box_pairs, closest_on_triangle, triangle_contact, triangle_distance, triangles_meet},
     geom::Aabb,
@@ -129,4 +132,16 @@ fn boxes(criterion: &mut Criterion) {
 }
 
 criterion_group!(benches, triangles, steps, boxes);
-criterion_main!(benches);
+
+fn main() {
+    let argument = |name: &str| std::env::args().any(|a| a == name);
+    // `cargo test --benches` asks for a short run, criterion's filters for a part of its own.
+    let filtered = std::env::args().skip(1).any(|a| !a.starts_with('-'));
+    if argument("peers") || !(filtered || argument("--test")) {
+        peers::run();
+    }
+    if !argument("peers") {
+        benches();
+        Criterion::default().configure_from_args().final_summary();
+    }
+}

@@ -211,6 +211,13 @@ impl Pose {
         }
     }
 
+    /// Whether both can be poses of one scene: as many nodes, morph weights and joints at the same places.
+    pub(crate) fn is_like(&self, other: &Self) -> bool {
+        let (a, b) = (&self.layout, &other.layout);
+        let alike = || a.weight_ranges == b.weight_ranges && a.joint_ranges == b.joint_ranges;
+        Arc::ptr_eq(a, b) || (self.world_from_node.len() == other.world_from_node.len() && alike())
+    }
+
     /// Global transform of a node.
     pub fn world_from_node(&self, node: NodeId) -> &DAffine3 {
         &self.world_from_node[node.index()]

@@ -10,6 +10,7 @@ use kinora::{
 use super::play::PlayArgs;
 use super::{
     cast::CastArgs,
+    collide::CollideArgs,
     completions::CompletionsArgs,
     info::InfoArgs,
     logs::Verbosity,
@@ -44,6 +45,8 @@ pub(crate) enum Command {
     Pose(PoseArgs),
     /// Answer rays from a file, timed
     Cast(CastArgs),
+    /// Step an animation and print what touches what, one JSON object a line
+    Collide(CollideArgs),
     /// Measure structures, with tables, plots and bounds
     Report(ReportArgs),
     /// Print a shell's completion script

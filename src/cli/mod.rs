@@ -5,6 +5,7 @@
 
 mod args;
 mod cast;
+mod collide;
 mod completions;
 mod error;
 mod geometry;
@@ -62,6 +63,7 @@ fn run(cli: &Cli) -> Result<(), CliError> {
         Command::Info(args) => info::run(args, &settings),
         Command::Pose(args) => pose::run(args, &settings),
         Command::Cast(args) => cast::run(args, &settings),
+        Command::Collide(args) => collide::run(args, &settings),
         Command::Report(args) => report::run(args, &settings),
         Command::Completions(args) => completions::run(args),
         Command::Man(args) => man::run(args),

@@ -20,7 +20,7 @@ impl Nearest {
         Self { distance: (b - a).length(), points: [a, b] }
     }
 
-    fn or(self, other: Self) -> Self {
+    pub(super) fn or(self, other: Self) -> Self {
         if other.distance < self.distance { other } else { self }
     }
 

@@ -19,3 +19,4 @@ mod tests;
 
 pub use config::{FrameConfig, FrameError, FrameState, LoopCounts, RebuildPolicy, StageTimes};
 pub use frame_loop::FrameLoop;
+pub(crate) use pool::Pool;

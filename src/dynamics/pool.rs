@@ -5,7 +5,7 @@ use std::sync::Arc;
 /// A frame takes a free buffer, writes it and keeps it shared with readers; when the last reader lets go it is
 /// free again. Two or three turn in steady state: this frame's, the next one's, and what a reader still holds.
 #[derive(Debug)]
-pub(super) struct Pool<T> {
+pub(crate) struct Pool<T> {
     kept: Vec<Arc<T>>,
 }
 
@@ -20,7 +20,7 @@ impl<T> Default for Pool<T> {
 
 impl<T> Pool<T> {
     /// A buffer that nobody else holds, as it was left, or a new one.
-    pub(super) fn take(&mut self, make: impl FnOnce() -> T) -> Arc<T> {
+    pub(crate) fn take(&mut self, make: impl FnOnce() -> T) -> Arc<T> {
         match self.kept.iter_mut().position(|item| Arc::get_mut(item).is_some()) {
             Some(free) => self.kept.swap_remove(free),
             None => Arc::new(make()),
@@ -28,7 +28,7 @@ impl<T> Pool<T> {
     }
 
     /// Remembers a buffer for later frames; the oldest remembered one is forgotten when there are too many.
-    pub(super) fn keep(&mut self, item: Arc<T>) {
+    pub(crate) fn keep(&mut self, item: Arc<T>) {
         if self.kept.len() == KEPT {
             self.kept.remove(0);
         }
@@ -36,7 +36,7 @@ impl<T> Pool<T> {
     }
 
     /// Runs `f` over every buffer that nobody else holds.
-    pub(super) fn for_each_free(&mut self, f: impl FnMut(&mut T)) {
+    pub(crate) fn for_each_free(&mut self, f: impl FnMut(&mut T)) {
         self.kept.iter_mut().filter_map(Arc::get_mut).for_each(f);
     }
 }
