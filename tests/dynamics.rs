@@ -8,8 +8,8 @@ use std::{
 
 use kinora::{
     accel::AccelKind,
-    anim::ActiveClip,
-    dynamics::{FrameConfig, FrameError, FrameLoop, RebuildPolicy},
+    anim::{ActiveClip, Fade},
+    dynamics::{FrameConfig, FrameError, FrameLoop, Playing, RebuildPolicy},
     geom::{Forms, Hit, InstanceId, Ray},
     glam::{DAffine3, DVec3, Vec3},
     scene::{ClipId, Scene, Trs},
@@ -109,10 +109,11 @@ fn advance(frames: &mut FrameLoop, time_s: f64) -> Arc<World> {
     frames.advance(&clips).unwrap().0
 }
 
-const POLICIES: [RebuildPolicy; 6] = [
+const POLICIES: [RebuildPolicy; 7] = [
     RebuildPolicy::Refit,
     RebuildPolicy::Rebuild,
     RebuildPolicy::Async,
+    RebuildPolicy::Auto,
     RebuildPolicy::SwapEvery(1),
     RebuildPolicy::SwapEvery(2),
     RebuildPolicy::SwapEvery(3),
@@ -287,6 +288,61 @@ fn a_decaying_tree_is_rebuilt_in_the_background_and_swapped_in() {
     }
     assert!(frames.counts().quality_max > 1.25);
     assert!(frames.counts().rebuilds_begun >= 3);
+}
+
+#[test]
+fn a_clip_that_was_learnt_swaps_its_trees_by_time_and_rebuilds_nothing() {
+    let rays = rays(60);
+    let mut learnt = looped("bvh2", RebuildPolicy::Auto, burst(5000));
+    let mut fresh = looped("bvh2", RebuildPolicy::Rebuild, burst(5000));
+    let trees = learnt.learn(0, &[ClipId(0)]).unwrap();
+    assert!((2..48).contains(&trees), "{trees} trees");
+    let play = |learnt: &mut FrameLoop, fresh: &mut FrameLoop| {
+        for frame in 0..40_u8 {
+            let clip = at(f64::from(frame) * 0.05);
+            let [a, b] = [learnt.advance(&[&clip]).unwrap().0, fresh.advance(&[&clip]).unwrap().0];
+            if frame % 8 == 5 {
+                assert!(cast(SimdLevel::Scalar, &a, &rays) == cast(SimdLevel::Scalar, &b, &rays), "frame {frame}");
+                a.validate().unwrap();
+            }
+        }
+    };
+    play(&mut learnt, &mut fresh);
+    let once = learnt.counts();
+    // Frames may pass over a tree.
+    assert_eq!((once.builds, once.rebuilds_begun), (0, 0), "{once:?}");
+    assert!(once.swaps >= 2 && once.swaps <= trees as u64, "{once:?} of {trees}");
+    assert!(once.quality_max < 1.5, "{once:?}");
+    play(&mut learnt, &mut fresh);
+    assert_eq!(learnt.counts().swaps, 2 * once.swaps, "the same trees again");
+    // A walk is served by one tree, a loop of another policy learns nothing.
+    let mut walk = looped("bvh2", RebuildPolicy::Auto, figure(400));
+    assert_eq!(walk.learn(0, &[ClipId(0)]).unwrap(), 1);
+    assert_eq!(fresh.learn(0, &[ClipId(0)]).unwrap(), 0);
+}
+
+#[test]
+fn a_cross_fade_begins_and_ends_at_the_clips_and_moves_between() {
+    let scene = Arc::new(figure(40));
+    let (from, to) = (at(0.2), at(1.4));
+    let top = |playing: Playing<'_>| {
+        let mut frames = FrameLoop::new(config("list", "list", RebuildPolicy::Refit, 1)).unwrap();
+        frames.add(scene.clone(), DAffine3::IDENTITY);
+        let world = frames.advance_playing(&[playing]).unwrap().0;
+        (0..3).map(|i| world.positions(InstanceId(i)).to_vec()).collect::<Vec<_>>()
+    };
+    let plain = |clips| top(Playing { clips, fade: None });
+    let faded = |alpha| top(Playing { clips: &to, fade: Some(Fade { from: &from, alpha }) });
+    assert_eq!(faded(0.0), plain(&from));
+    assert_eq!(faded(-3.0), plain(&from));
+    assert_eq!(faded(1.0), plain(&to));
+    assert_eq!(faded(f64::NAN), plain(&to));
+    let half = faded(0.5);
+    assert!(half != plain(&from) && half != plain(&to));
+    assert_eq!(half[0], plain(&from)[0], "what stands still in both stands still between them");
+    let ends = [plain(&from), half, plain(&to)].map(|parts| parts[2][0]);
+    let reach = ends[0].distance(ends[2]);
+    assert!(ends[1].distance(ends[0]) < reach && ends[1].distance(ends[2]) < reach, "{ends:?}");
 }
 
 #[test]

@@ -24,4 +24,4 @@ pub use deform::{
 };
 pub use left_out::{LeftOut, left_out};
 pub use normals::{vertex_normal, vertex_tangent};
-pub use pose::{ActiveClip, Pose};
+pub use pose::{ActiveClip, Fade, Pose};

@@ -3,7 +3,7 @@ use std::{ops::Range, sync::Arc};
 use glam::DAffine3;
 
 use super::{
-    sampler,
+    quat, sampler,
     transform::{from_matrix, from_trs, local_matrix, product},
 };
 use crate::scene::{Channel, ChannelTarget, Clip, ClipId, LocalTransform, NodeId, Scene, SkinId, Trs};
@@ -15,6 +15,15 @@ pub struct ActiveClip {
     pub clip: ClipId,
     /// Time on the clip's own clock in seconds; clamped to each sampler's keys.
     pub time_s: f64,
+}
+
+/// A cross-fade from other clips.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Fade<'a> {
+    /// The clips that are left.
+    pub from: &'a [ActiveClip],
+    /// How much of the new ones there is: 0 for none, 1 for nothing else. Values beyond count as the nearer end, NaN as 1.
+    pub alpha: f64,
 }
 
 /// A joint matrix as four columns, each padded to the width of a vector register.
@@ -84,6 +93,9 @@ pub struct Pose {
     fast_palette: Vec<JointRow>,
     /// Components of the driven nodes, as far as `active` says.
     trs: Vec<Trs>,
+    /// The same of the clips that are faded out, and their weights.
+    faded_trs: Vec<Trs>,
+    faded_weights: Vec<f64>,
     active: Vec<bool>,
     was_active: Vec<bool>,
     /// Nodes whose global transform was computed anew by the last evaluation.
@@ -105,6 +117,8 @@ impl Pose {
             palette: vec![JointColumns::from(&DAffine3::IDENTITY); joints],
             fast_palette: vec![JointRow::from(&DAffine3::IDENTITY); joints],
             trs: layout.rest_trs.clone(),
+            faded_trs: layout.rest_trs.clone(),
+            faded_weights: layout.rest_weights.clone(),
             active: vec![false; driven],
             was_active: vec![false; driven],
             dirty: vec![true; scene.nodes.len()],
@@ -129,15 +143,55 @@ impl Pose {
     /// in it.
     pub fn evaluate(&mut self, scene: &Scene, clips: &[ActiveClip], world_from_scene: &DAffine3) {
         assert_eq!(scene.nodes.len(), self.world_from_node.len(), "the pose belongs to another scene");
+        self.begin();
         self.sample_nodes(scene, clips);
         self.sample_weights(scene, clips);
         self.place_nodes(scene, world_from_scene);
         self.place_joints(scene);
     }
 
-    fn sample_nodes(&mut self, scene: &Scene, clips: &[ActiveClip]) {
+    /// As [`Pose::evaluate`], on the way from other clips: translations, scales and weights on a straight line between what either gives,
+    /// rotations on the shorter arc. What only one of them drives is faded from or to the rest pose. At either end the pose is that of
+    /// [`Pose::evaluate`], bit for bit. No allocation.
+    ///
+    /// # Panics
+    /// As there.
+    pub fn evaluate_faded(&mut self, scene: &Scene, fade: Fade<'_>, clips: &[ActiveClip], world_from_scene: &DAffine3) {
+        let alpha = fade.alpha;
+        if alpha <= 0.0 {
+            return self.evaluate(scene, fade.from, world_from_scene);
+        }
+        if alpha.is_nan() || alpha >= 1.0 {
+            return self.evaluate(scene, clips, world_from_scene);
+        }
+        assert_eq!(scene.nodes.len(), self.world_from_node.len(), "the pose belongs to another scene");
+        self.begin();
+        self.sample_nodes(scene, fade.from);
+        self.sample_weights(scene, fade.from);
+        std::mem::swap(&mut self.trs, &mut self.faded_trs);
+        std::mem::swap(&mut self.weights, &mut self.faded_weights);
+        self.sample_nodes(scene, clips);
+        self.sample_weights(scene, clips);
+        for (to, from) in self.trs.iter_mut().zip(&self.faded_trs) {
+            to.translation = from.translation + (to.translation - from.translation) * alpha;
+            to.scale = from.scale + (to.scale - from.scale) * alpha;
+            to.rotation = quat::slerp(from.rotation, to.rotation, alpha);
+        }
+        for (to, from) in self.weights.iter_mut().zip(&self.faded_weights) {
+            *to = from + (*to - from) * alpha;
+        }
+        self.place_nodes(scene, world_from_scene);
+        self.place_joints(scene);
+    }
+
+    /// Forgets what was driven the last time but one.
+    fn begin(&mut self) {
         std::mem::swap(&mut self.active, &mut self.was_active);
         self.active.fill(false);
+    }
+
+    /// Samples components of the driven nodes, and adds to what is driven.
+    fn sample_nodes(&mut self, scene: &Scene, clips: &[ActiveClip]) {
         self.trs.copy_from_slice(&self.layout.rest_trs);
         for (clip, channel, time_s) in channels(scene, clips) {
             let (ChannelTarget::Translation(node) | ChannelTarget::Rotation(node) | ChannelTarget::Scale(node)) =

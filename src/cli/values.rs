@@ -90,12 +90,13 @@ pub(crate) fn size(text: &str) -> Result<(u32, u32), String> {
 pub(crate) fn policy(text: &str) -> Result<RebuildPolicy, String> {
     match text {
         "async" => return Ok(RebuildPolicy::Async),
+        "auto" => return Ok(RebuildPolicy::Auto),
         "refit" => return Ok(RebuildPolicy::Refit),
         "rebuild" => return Ok(RebuildPolicy::Rebuild),
         _ => {}
     }
     let every = text.strip_prefix("swap-every=").and_then(|k| k.parse().ok()).filter(|&k| k > 0);
-    let expected = || "expected async, refit, rebuild, or swap-every=K with K of 1 or more".to_owned();
+    let expected = || "expected async, auto, refit, rebuild, or swap-every=K with K of 1 or more".to_owned();
     every.map(RebuildPolicy::SwapEvery).ok_or_else(expected)
 }
 

@@ -2,7 +2,7 @@ use std::sync::Arc;
 
 use glam::DAffine3;
 
-use super::pool::Pool;
+use super::{Playing, pool::Pool};
 use crate::{
     anim::{ActiveClip, MotionClass, Pose, classify},
     scene::{PartInstance, Scene},
@@ -21,6 +21,9 @@ pub(super) struct Actor {
     /// The pose before, while a frame in which it changed is made.
     pub(super) previous: Option<Arc<Pose>>,
     clips: Vec<ActiveClip>,
+    /// What the clips were faded in from, and how far.
+    fade: Option<f64>,
+    faded: Vec<ActiveClip>,
     posed: bool,
     poses: Pool<Pose>,
 }
@@ -35,6 +38,8 @@ impl Actor {
             travels: false,
             previous: None,
             clips: Vec::new(),
+            fade: None,
+            faded: Vec::new(),
             posed: false,
             poses: Pool::default(),
         }
@@ -56,20 +61,38 @@ impl Actor {
     }
 
     /// Poses the actor unless clips, times and place are those of the last call; true when it did.
-    pub(super) fn pose(&mut self, clips: &[ActiveClip]) -> bool {
+    pub(super) fn pose(&mut self, playing: Playing<'_>) -> bool {
         self.previous = None;
-        if self.posed && same_clips(&self.clips, clips) {
+        let Playing { clips, fade } = playing;
+        let faded = fade.map_or(&[][..], |fade| fade.from);
+        let alpha = fade.map(|fade| fade.alpha);
+        let same_fade = self.fade.map(f64::to_bits) == alpha.map(f64::to_bits) && same_clips(&self.faded, faded);
+        if self.posed && same_clips(&self.clips, clips) && same_fade {
             return false;
         }
         let mut next = self.poses.take(|| Pose::clone(&self.pose));
         let pose = Arc::get_mut(&mut next).expect("a taken buffer has one owner");
-        pose.evaluate(&self.scene, clips, &self.world_from_scene);
+        match fade {
+            Some(fade) => pose.evaluate_faded(&self.scene, fade, clips, &self.world_from_scene),
+            None => pose.evaluate(&self.scene, clips, &self.world_from_scene),
+        }
         self.poses.keep(next.clone());
         self.previous = Some(std::mem::replace(&mut self.pose, next));
         self.clips.clear();
         self.clips.extend_from_slice(clips);
+        self.fade = alpha;
+        self.faded.clear();
+        self.faded.extend_from_slice(faded);
         self.posed = true;
         true
+    }
+
+    /// The clip that the actor plays by itself, if it does.
+    pub(super) fn sole_clip(&self) -> Option<ActiveClip> {
+        match &self.clips[..] {
+            &[only] if self.fade.is_none() && !self.travels => Some(only),
+            _ => None,
+        }
     }
 
     /// True when this frame's pose places or shapes `part` other than the last one did.

@@ -5,16 +5,12 @@
 
 use std::{
     panic::{AssertUnwindSafe, catch_unwind},
-    sync::{
-        Arc,
-        atomic::{AtomicBool, Ordering},
-    },
-    thread::JoinHandle,
+    sync::Arc,
 };
 
-use crossbeam::channel::{Receiver, Sender, TryRecvError, unbounded};
 use glam::Vec3;
 
+use super::worker::Worker;
 use crate::{
     accel::{AccelSpec, AnyAccel, BuildError},
     world::GroupLayout,
@@ -25,6 +21,10 @@ use crate::{
 pub(super) struct Job {
     pub(super) layout: Arc<GroupLayout>,
     pub(super) positions: Arc<Vec<Vec3>>,
+    /// The vertices a frame earlier, if they moved since.
+    pub(super) before: Option<Arc<Vec<Vec3>>>,
+    /// By how many frames of such motion the tree shall be ahead.
+    pub(super) ahead: f32,
     /// The frame that the snapshot is of.
     pub(super) frame: u64,
     /// Panic instead of building.
@@ -44,8 +44,8 @@ pub(super) struct Outcome {
 #[derive(Debug)]
 pub(super) struct Built {
     pub(super) accel: AnyAccel,
-    /// The vertices that it was built from.
-    pub(super) positions: Arc<Vec<Vec3>>,
+    /// The vertices that it was built from, if they are those of a frame.
+    pub(super) positions: Option<Arc<Vec<Vec3>>>,
     /// The frame that they are of.
     pub(super) frame: u64,
 }
@@ -57,97 +57,52 @@ pub(super) enum Failure {
     Panicked(String),
 }
 
-/// The thread and the channels to it. Dropping it waits for the build under way, if any, and no more.
-#[derive(Debug)]
-pub(super) struct Builder {
-    jobs: Option<Sender<Job>>,
-    outcomes: Receiver<Outcome>,
-    stop: Arc<AtomicBool>,
-    thread: Option<JoinHandle<()>>,
-    /// Jobs whose outcome has not been taken.
-    in_flight: usize,
+/// The thread and what it builds with. Dropping it waits for the build under way, if any, and no more.
+pub(super) type Builder = Worker<Job, Outcome>;
+
+/// Starts the thread, which builds what `spec` says.
+pub(super) fn start(spec: Arc<AccelSpec>) -> std::io::Result<Builder> {
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(1)
+        .thread_name(|_| "kinora-build".to_owned())
+        .build()
+        .map_err(std::io::Error::other)?;
+    let mut expected = Vec::new();
+    Worker::start("kinora-rebuild", move |job| run(&pool, &spec, job, &mut expected))
 }
 
-impl Builder {
-    /// Starts the thread, which builds what `spec` says.
-    pub(super) fn start(spec: Arc<AccelSpec>) -> std::io::Result<Self> {
-        let (jobs, job_queue) = unbounded();
-        let (outcome_queue, outcomes) = unbounded();
-        let stop = Arc::new(AtomicBool::new(false));
-        let stopped = stop.clone();
-        let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(1)
-            .thread_name(|_| "kinora-build".to_owned())
-            .build()
-            .map_err(std::io::Error::other)?;
-        let thread = std::thread::Builder::new().name("kinora-rebuild".to_owned()).spawn(move || {
-            for job in job_queue {
-                if stopped.load(Ordering::Relaxed) {
-                    break;
-                }
-                if outcome_queue.send(run(&pool, &spec, job)).is_err() {
-                    break;
-                }
-            }
-        })?;
-        Ok(Self { jobs: Some(jobs), outcomes, stop, thread: Some(thread), in_flight: 0 })
-    }
-
-    /// Hands over a job.
-    pub(super) fn send(&mut self, job: Job) {
-        let sender = self.jobs.as_ref().expect("open until dropped");
-        sender.send(job).expect("the thread lives until dropped: builds are caught");
-        self.in_flight += 1;
-    }
-
-    /// The next outcome if there is one.
-    pub(super) fn poll(&mut self) -> Option<Outcome> {
-        match self.outcomes.try_recv() {
-            Ok(outcome) => {
-                self.in_flight -= 1;
-                Some(outcome)
-            }
-            Err(TryRecvError::Empty | TryRecvError::Disconnected) => None,
-        }
-    }
-
-    /// The next outcome, waiting for it; `None` when nothing is in flight.
-    pub(super) fn wait(&mut self) -> Option<Outcome> {
-        if self.in_flight == 0 {
-            return None;
-        }
-        let outcome = self.outcomes.recv().expect("the thread answers every job: builds are caught");
-        self.in_flight -= 1;
-        Some(outcome)
-    }
-}
-
-impl Drop for Builder {
-    fn drop(&mut self) {
-        self.stop.store(true, Ordering::Relaxed);
-        self.jobs = None;
-        if let Some(thread) = self.thread.take() {
-            // A panic outside of a build cannot be reported from here.
-            let _ = thread.join();
-        }
-    }
-}
-
-fn run(pool: &rayon::ThreadPool, spec: &AccelSpec, job: Job) -> Outcome {
+fn run(pool: &rayon::ThreadPool, spec: &AccelSpec, job: Job, expected: &mut Vec<Vec3>) -> Outcome {
     let prims = job.layout.indices.len();
     let _span = tracing::info_span!("rebuild", frame = job.frame, accel = spec.kind().name(), prims).entered();
     let epoch = job.layout.topology_epoch;
+    let before = job.before.as_ref().filter(|before| job.ahead > 0.0 && before.len() == job.positions.len());
     let build = || {
         #[cfg(test)]
         assert!(!job.panic, "asked to panic");
-        pool.install(|| spec.build(&job.layout.triangles(&job.positions)))
+        let positions = match before {
+            Some(before) => {
+                expect(before, &job.positions, job.ahead, expected);
+                &expected[..]
+            }
+            None => &job.positions[..],
+        };
+        pool.install(|| spec.build(&job.layout.triangles(positions)))
     };
     let result = match catch_unwind(AssertUnwindSafe(build)) {
-        Ok(Ok(accel)) => Ok(Built { accel, positions: job.positions, frame: job.frame }),
+        Ok(Ok(accel)) => Ok(Built { accel, positions: before.is_none().then_some(job.positions), frame: job.frame }),
         Ok(Err(error)) => Err(Failure::Build(error)),
         Err(panic) => Err(Failure::Panicked(message(panic.as_ref()))),
     };
     Outcome { epoch, result }
+}
+
+/// Where vertices will be when they go on as they did from one frame to the next: the tree will be in use then. Only its topology comes of it.
+fn expect(before: &[Vec3], now: &[Vec3], frames: f32, out: &mut Vec<Vec3>) {
+    out.clear();
+    out.extend(before.iter().zip(now).map(|(&before, &now)| {
+        let then = now + (now - before) * frames;
+        if then.is_finite() { then } else { now }
+    }));
 }
 
 fn message(panic: &(dyn std::any::Any + Send)) -> String {

@@ -1,6 +1,10 @@
 use std::{fmt, sync::Arc, time::Duration};
 
-use crate::{accel::events::Inversions, geom::Forms};
+use crate::{
+    accel::events::Inversions,
+    anim::{ActiveClip, Fade},
+    geom::Forms,
+};
 
 /// Why a frame could not be made.
 #[derive(Debug, thiserror::Error)]
@@ -103,6 +107,15 @@ pub struct FrameState {
     pub inversions: Inversions,
 }
 
+/// What an actor plays in a frame.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Playing<'a> {
+    /// The clips; none for the rest pose.
+    pub clips: &'a [ActiveClip],
+    /// What they are faded in from.
+    pub fade: Option<Fade<'a>>,
+}
+
 /// How trees are kept good.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum RebuildPolicy {
@@ -113,6 +126,8 @@ pub enum RebuildPolicy {
     /// Refit every frame, rebuild in the background when quality decays.
     #[default]
     Async,
+    /// As `Async`, but what [`FrameLoop::learn`](super::FrameLoop::learn) has learnt of a clip beforehand serves while the clip plays.
+    Auto,
     /// As `Async`, but a rebuild is begun every K frames (at least 1) and taken K frames later, whatever the
     /// timing and the quality.
     SwapEvery(u32),
@@ -125,6 +140,7 @@ impl fmt::Display for RebuildPolicy {
             Self::Refit => f.write_str("refit"),
             Self::Rebuild => f.write_str("rebuild"),
             Self::Async => f.write_str("async"),
+            Self::Auto => f.write_str("auto"),
             Self::SwapEvery(every) => write!(f, "swap-every={every}"),
         }
     }

@@ -3,8 +3,8 @@ use std::{fmt, sync::Arc, time::Instant};
 use glam::DAffine3;
 
 use super::{
-    FrameConfig, FrameError, FrameState, LoopCounts, RebuildPolicy, StageTimes,
-    builder::{Builder, Failure, Outcome},
+    FrameConfig, FrameError, FrameState, LoopCounts, Playing, RebuildPolicy, StageTimes,
+    builder::{self, Builder, Failure, Outcome},
     group::Group,
     grouping::Grouping,
     pool::Pool,
@@ -13,13 +13,13 @@ use super::{
 use crate::{
     accel::{AccelSpec, BuildError},
     anim::ActiveClip,
-    scene::Scene,
+    scene::{ClipId, Scene},
     simd::check_float_mode,
     world::{TopKind, World},
 };
 
 /// Decay of a structure at which a background rebuild is begun.
-const DECAYED: f64 = 1.25;
+const DECAYED: f64 = 1.1;
 
 /// Rebuilds are handed to the builder until this many triangles wait there; at least one is.
 const QUEUED_TRIANGLES: usize = 1 << 16;
@@ -103,11 +103,48 @@ impl FrameLoop {
     /// When foreign code changed how this thread or the pool's compute, a build fails, the background builder panicked, a vertex lies at the end of f32, or more is placed than numbers allow for. The loop
     /// can go on after a failed rebuild; the group concerned keeps its refitted tree.
     pub fn advance(&mut self, clips: &[&[ActiveClip]]) -> Result<(Arc<World>, StageTimes), FrameError> {
+        self.advance_by(&|actor| Playing { clips: clips.get(actor).copied().unwrap_or(&[]), fade: None })
+    }
+
+    /// As [`FrameLoop::advance`] with cross-fades: `playing[i]` for actor i.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn advance_playing(&mut self, playing: &[Playing<'_>]) -> Result<(Arc<World>, StageTimes), FrameError> {
+        self.advance_by(&|actor| playing.get(actor).copied().unwrap_or_default())
+    }
+
+    /// Looks at clips before they play: chooses, for each large part of the actor that they move, the fewest trees that serve each clip to its end
+    /// by refitting. Frames of [`RebuildPolicy::Auto`] in which the actor plays one of them, at its place and without a fade, refit these trees and
+    /// rebuild nothing. The number of trees.
+    ///
+    /// Takes some fifty builds and refits a clip, in the loop's pool, and memory for as many trees while it lasts, a gigabyte at most.
+    ///
+    /// # Errors
+    /// As [`FrameLoop::advance`].
+    ///
+    /// # Panics
+    /// When there is no such actor.
+    pub fn learn(&mut self, actor: usize, clips: &[ClipId]) -> Result<usize, FrameError> {
+        check_float_mode()?;
+        self.stage.settle()?;
+        let pool = self.config.pool.clone();
+        let mut trees = 0;
+        for &clip in clips.iter().filter(|_| self.config.policy == RebuildPolicy::Auto) {
+            trees += pool.install(|| self.stage.learn(actor, clip, &self.spec, self.config.forms.deform))?;
+        }
+        Ok(trees)
+    }
+
+    fn advance_by<'a>(
+        &mut self,
+        playing: &(impl Fn(usize) -> Playing<'a> + Sync),
+    ) -> Result<(Arc<World>, StageTimes), FrameError> {
         check_float_mode()?;
         self.stage.settle()?;
         self.take_rebuilds()?;
         let pool = self.config.pool.clone();
-        let made = pool.install(|| self.make(clips))?;
+        let made = pool.install(|| self.make(playing))?;
         self.begin_rebuilds()?;
         self.counts.frames += 1;
         Ok(made)
@@ -123,8 +160,15 @@ impl FrameLoop {
         self.last
     }
 
+    fn rebuilds_in_background(&self) -> bool {
+        !matches!(self.config.policy, RebuildPolicy::Refit | RebuildPolicy::Rebuild)
+    }
+
     /// Pose, deform, refit; in the loop's pool.
-    fn make(&mut self, clips: &[&[ActiveClip]]) -> Result<(Arc<World>, StageTimes), FrameError> {
+    fn make<'a>(
+        &mut self,
+        playing: &(impl Fn(usize) -> Playing<'a> + Sync),
+    ) -> Result<(Arc<World>, StageTimes), FrameError> {
         check_float_mode()?;
         let frame = self.counts.frames;
         let mut times = StageTimes::default();
@@ -132,13 +176,13 @@ impl FrameLoop {
 
         let began = Instant::now();
         let span = tracing::info_span!("pose", frame).entered();
-        self.counts.poses += self.stage.pose(clips);
+        self.counts.poses += self.stage.pose(playing);
         drop(span);
         times.pose = began.elapsed();
 
         let began = Instant::now();
         let span = tracing::info_span!("deform", frame).entered();
-        self.counts.deforms += self.stage.deform(self.config.forms.deform);
+        self.counts.deforms += self.stage.deform(self.config.forms.deform, self.rebuilds_in_background());
         drop(span);
         times.deform = began.elapsed();
 
@@ -209,7 +253,7 @@ impl FrameLoop {
                 }
                 Ok(())
             }
-            RebuildPolicy::Async => {
+            RebuildPolicy::Async | RebuildPolicy::Auto => {
                 while self.stage.rebuilding_triangles() < QUEUED_TRIANGLES {
                     let Some(number) = self.stage.most_decayed(DECAYED) else { break };
                     self.begin(number)?;
@@ -221,11 +265,15 @@ impl FrameLoop {
 
     fn begin(&mut self, number: usize) -> Result<(), FrameError> {
         if self.builder.is_none() {
-            self.builder = Some(Builder::start(self.spec.clone()).map_err(FrameError::BuilderStart)?);
+            self.builder = Some(builder::start(self.spec.clone()).map_err(FrameError::BuilderStart)?);
         }
         let builder = self.builder.as_mut().expect("started above");
+        let lag = match self.config.policy {
+            RebuildPolicy::SwapEvery(every) => Some(u64::from(every.max(1))),
+            _ => None,
+        };
         #[cfg_attr(not(test), expect(unused_mut, reason = "tests change it"))]
-        let mut job = self.stage.groups[number].begin_rebuild(self.counts.frames);
+        let mut job = self.stage.groups[number].begin_rebuild(self.counts.frames, lag);
         #[cfg(test)]
         {
             job.panic = std::mem::take(&mut self.panic_in_next_rebuild);

@@ -8,11 +8,14 @@ use super::{
     builder::{Built, Job},
     deform::deform_chunks,
     layout::Shape,
+    phases::Phases,
     pool::Pool,
 };
 use crate::{
     accel::{AccelSpec, AnyAccel, Refit},
+    anim::ActiveClip,
     geom::Precision,
+    scene::ClipId,
     world::GroupFrame,
 };
 
@@ -34,6 +37,16 @@ pub(super) struct Group {
     moved_since_build: bool,
     /// The frame whose vertices the structure was built from.
     built_of: u64,
+    /// The vertices of the frame before, where they moved since and somebody asks for them.
+    before: Option<Arc<Vec<Vec3>>>,
+    /// Frames that the last background rebuild took.
+    lag: u64,
+    /// Trees of clips that are known.
+    phases: Vec<Phases>,
+    /// The clip that plays in the frame being made.
+    playing: Option<ActiveClip>,
+    /// The clip and the number of its tree that is in use.
+    phase: Option<(ClipId, usize)>,
     rebuild: Rebuild,
     /// What the last `update` did, or why it failed.
     pub(super) outcome: Result<Work, FrameError>,
@@ -82,23 +95,33 @@ impl Group {
             deformed: false,
             moved_since_build: false,
             built_of: 0,
+            before: None,
+            lag: 0,
+            phases: Vec::new(),
+            playing: None,
+            phase: None,
             rebuild: Rebuild::Idle,
             outcome: Ok(Work::default()),
         }
     }
 
-    /// Computes the vertices when the poses of this frame call for it.
-    pub(super) fn deform(&mut self, precision: Precision, actors: &[Actor]) {
+    /// Computes the vertices when the poses of this frame call for it; `foresees` keeps those of the frame before.
+    pub(super) fn deform(&mut self, precision: Precision, actors: &[Actor], foresees: bool) {
+        self.before = None;
         self.deformed = self.accel.is_none() || self.moved(actors);
         if !self.deformed {
             return;
         }
+        self.playing = self.actor.and_then(|actor| actors[actor].sole_clip());
         let count = self.shape.layout.vertex_count;
         let mut next = self.position_pool.take(|| vec![Vec3::ZERO; count]);
         let out = Arc::get_mut(&mut next).expect("a taken buffer has one owner");
         deform_chunks(precision, &self.shape.chunks, actors, out);
         self.position_pool.keep(next.clone());
-        self.positions = next;
+        let before = mem::replace(&mut self.positions, next);
+        if foresees && self.accel.is_some() {
+            self.before = Some(before);
+        }
         self.moved_since_build = true;
     }
 
@@ -129,16 +152,40 @@ impl Group {
         if !self.deformed {
             return Ok(Work::default());
         }
+        if let Some((number, tree)) = self.playing.and_then(|now| self.phases.iter().find_map(|phases| phases.at(now))) {
+            let (tree, phase) = (tree.clone(), self.playing.map(|now| (now.clip, number)));
+            return self.follow(&tree, phase, spec, frame);
+        }
+        self.phase = None;
         match self.accel.take() {
             Some(accel) if !rebuild_always => self.refit(&accel, spec, frame),
             _ => self.build(spec, frame),
         }
     }
 
+    /// Refits the tree of a phase, which is swapped in when another was in use.
+    fn follow(
+        &mut self,
+        tree: &Arc<AnyAccel>,
+        phase: Option<(ClipId, usize)>,
+        spec: &AccelSpec,
+        frame: u64,
+    ) -> Result<Work, FrameError> {
+        let swaps = u64::from(self.phase != phase);
+        if swaps > 0 {
+            self.built_of = frame;
+        }
+        let work = self.refit(tree, spec, frame)?;
+        self.phase = phase;
+        Ok(Work { swaps, ..work })
+    }
+
     fn swap(&mut self, built: Built, spec: &AccelSpec, frame: u64) -> Result<Work, FrameError> {
         let base = Arc::new(built.accel);
         self.built_of = built.frame;
-        let work = if Arc::ptr_eq(&built.positions, &self.positions) {
+        self.lag = frame.saturating_sub(built.frame);
+        self.phase = None;
+        let work = if built.positions.is_some_and(|positions| Arc::ptr_eq(&positions, &self.positions)) {
             self.moved_since_build = false;
             self.accel = Some(base.clone());
             Work::default()
@@ -197,7 +244,18 @@ impl Group {
 
     /// True when a background rebuild could improve the structure.
     pub(super) fn wants_rebuild(&self) -> bool {
-        self.moved_since_build && self.triangle_count() > 0 && matches!(self.rebuild, Rebuild::Idle)
+        self.moved_since_build && self.phase.is_none() && self.triangle_count() > 0 && matches!(self.rebuild, Rebuild::Idle)
+    }
+
+    /// Takes the trees of a clip in place of those that it had for it.
+    pub(super) fn learn(&mut self, phases: Phases) {
+        self.phases.retain(|known| known.clip() != phases.clip());
+        self.phases.push(phases);
+    }
+
+    /// The actor that moves the group.
+    pub(super) fn actor(&self) -> Option<usize> {
+        self.actor
     }
 
     /// True while the builder has this group.
@@ -209,12 +267,17 @@ impl Group {
         self.shape.layout.indices.len()
     }
 
-    /// The rebuild job of this frame's geometry, noted as begun.
-    pub(super) fn begin_rebuild(&mut self, frame: u64) -> Job {
+    /// The rebuild job of this frame's geometry, noted as begun. It is to be swapped in after `lag` frames, if that is known.
+    ///
+    /// The tree will be in use from its swap to the next one, about as many frames later, so it is built for the middle of these.
+    #[expect(clippy::cast_precision_loss, reason = "few frames")]
+    pub(super) fn begin_rebuild(&mut self, frame: u64, lag: Option<u64>) -> Job {
         self.rebuild = Rebuild::Begun;
         Job {
             layout: self.shape.layout.clone(),
             positions: self.positions.clone(),
+            before: self.before.take(),
+            ahead: 1.5 * lag.unwrap_or(self.lag).min(1000) as f32,
             frame,
             #[cfg(test)]
             panic: false,

@@ -12,11 +12,14 @@ mod frame_loop;
 mod group;
 mod grouping;
 mod layout;
+mod phases;
 mod pool;
 mod stage;
+mod sync;
 #[cfg(test)]
 mod tests;
+mod worker;
 
-pub use config::{FrameConfig, FrameError, FrameState, LoopCounts, RebuildPolicy, StageTimes};
+pub use config::{FrameConfig, FrameError, FrameState, LoopCounts, Playing, RebuildPolicy, StageTimes};
 pub use frame_loop::FrameLoop;
 pub(crate) use pool::Pool;

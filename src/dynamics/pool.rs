@@ -1,4 +1,4 @@
-use std::sync::Arc;
+use super::sync::Arc;
 
 /// Buffers that are written again once nobody else holds them.
 ///

@@ -4,17 +4,19 @@ use glam::DAffine3;
 use rayon::prelude::*;
 
 use super::{
-    FrameError,
+    FrameError, Playing,
     actor::Actor,
+    deform::deform_chunks,
     group::{Group, MemberKey, Work},
     grouping::{ActorParts, GroupPlan, Grouping, plan},
     layout::{Member, Shape, check, lay_out},
+    phases::{self, LEAST, Phases, Sample},
 };
 use crate::{
     accel::AccelSpec,
-    anim::ActiveClip,
+    anim::{ActiveClip, Pose},
     geom::{InstanceId, Precision},
-    scene::Scene,
+    scene::{ClipId, Scene},
     world::{ActorFrame, Place, TopKind, World, WorldInstance},
 };
 
@@ -144,23 +146,57 @@ impl Stage {
     }
 
     /// Poses every actor whose clips changed; their number.
-    pub(super) fn pose(&mut self, clips: &[&[ActiveClip]]) -> u64 {
-        let pose =
-            |(number, actor): (usize, &mut Actor)| u64::from(actor.pose(clips.get(number).copied().unwrap_or(&[])));
+    pub(super) fn pose<'a>(&mut self, playing: &(impl Fn(usize) -> Playing<'a> + Sync)) -> u64 {
+        let pose = |(number, actor): (usize, &mut Actor)| u64::from(actor.pose(playing(number)));
         match &mut self.actors[..] {
             [only] => pose((0, only)),
             actors => actors.par_iter_mut().enumerate().map(pose).sum(),
         }
     }
 
-    /// Computes the vertices of every group that moved; the number of groups.
-    pub(super) fn deform(&mut self, precision: Precision) -> u64 {
+    /// Computes the vertices of every group that moved; the number of groups. `foresees` keeps those of the frame before.
+    pub(super) fn deform(&mut self, precision: Precision, foresees: bool) -> u64 {
         let actors = &self.actors;
         match &mut self.groups[..] {
-            [only] => only.deform(precision, actors),
-            groups => groups.par_iter_mut().for_each(|group| group.deform(precision, actors)),
+            [only] => only.deform(precision, actors, foresees),
+            groups => groups.par_iter_mut().for_each(|group| group.deform(precision, actors, foresees)),
         }
         self.groups.iter().map(|group| u64::from(group.deformed())).sum()
+    }
+
+    /// Chooses trees for a clip of an actor, in the current rayon pool; how many there are.
+    pub(super) fn learn(
+        &mut self,
+        number: usize,
+        clip: ClipId,
+        spec: &AccelSpec,
+        precision: Precision,
+    ) -> Result<usize, FrameError> {
+        let actor = &self.actors[number];
+        let Some(duration_s) = actor.scene.clips.get(clip.index()).map(|clip| clip.duration_s) else { return Ok(0) };
+        let kept = actor.pose.clone();
+        let mut trees = 0;
+        for group in self.groups.iter_mut().filter(|group| group.actor() == Some(number)) {
+            if group.triangle_count() < LEAST {
+                continue;
+            }
+            let mut samples = Vec::new();
+            for time_s in phases::times(&group.shape.layout, duration_s) {
+                let actor = &mut self.actors[number];
+                let mut pose = Pose::clone(&kept);
+                pose.evaluate(&actor.scene, &[ActiveClip { clip, time_s }], &actor.world_from_scene);
+                actor.pose = Arc::new(pose);
+                let mut positions = vec![glam::Vec3::ZERO; group.shape.layout.vertex_count];
+                deform_chunks(precision, &group.shape.chunks, &self.actors, &mut positions);
+                samples.push(Sample { time_s, positions });
+            }
+            let chosen = Phases::choose(clip, &group.shape.layout, &samples, spec);
+            self.actors[number].pose = kept.clone();
+            let chosen = chosen?;
+            trees += chosen.len();
+            group.learn(chosen);
+        }
+        Ok(trees)
     }
 
     /// Triangles of the groups that moved.

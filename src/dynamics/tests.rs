@@ -116,6 +116,37 @@ fn packets_answer_as_single_rays_do() {
 }
 
 #[test]
+fn thousands_of_panics_of_the_builder_are_thousands_of_errors_and_nothing_else() {
+    std::panic::set_hook(Box::new(|_| {}));
+    let mut frames = FrameLoop::new(config("bvh2", RebuildPolicy::SwapEvery(1))).unwrap();
+    let scenes = [burst(40), burst(25)].map(Arc::new);
+    frames.add(scenes[0].clone(), DAffine3::IDENTITY);
+    let (mut failed, mut made) = (0, 0);
+    for frame in 0..3000_u32 {
+        // A group whose rebuild failed is not rebuilt again, so each panic is followed by another scene, some while a tree is built.
+        if frame % 4 == 3 {
+            frames.replace(0, scenes[usize::from(frame % 8 == 3)].clone(), DAffine3::IDENTITY);
+        }
+        frames.panic_in_next_rebuild = frame % 4 == 1;
+        match frames.advance(&[&at(f64::from(frame % 19) * 0.1)]) {
+            Ok((world, _)) => {
+                made += 1;
+                assert!(world.triangle_count() == 40 || world.triangle_count() == 25);
+            }
+            Err(FrameError::BuilderPanicked(message)) => {
+                failed += 1;
+                assert!(message.contains("asked to panic"), "{message}");
+            }
+            Err(other) => panic!("{other}"),
+        }
+    }
+    drop(std::panic::take_hook());
+    assert!(failed >= 700 && made + failed == 3000, "{failed} failed, {made} made");
+    let counts = frames.counts();
+    assert!(counts.swaps > 500, "{counts:?}");
+}
+
+#[test]
 fn a_panic_of_the_builder_is_an_error_of_one_frame() {
     let mut frames = FrameLoop::new(config("list", RebuildPolicy::SwapEvery(1))).unwrap();
     frames.add(Arc::new(burst(50)), DAffine3::IDENTITY);

@@ -7,6 +7,7 @@ use super::{
     boxes::BoxWalk,
     lists::{Event, Inversions},
     local::{ListMut, append},
+    long::{How, Scratch},
     ranks::{RankWord, Ranks},
     ray::{EventRay, WIDEN},
     walk::{ListView, ListWalk, seat_point},
@@ -22,11 +23,12 @@ pub(crate) struct FlatLists {
     events: [Vec<Event>; 3],
     ranks: Vec<Ranks<Word>>,
     bounds: Aabb,
+    scratch: [Scratch; 3],
 }
 
 impl Default for FlatLists {
     fn default() -> Self {
-        Self { events: Default::default(), ranks: Vec::new(), bounds: Aabb::EMPTY }
+        Self { events: Default::default(), ranks: Vec::new(), bounds: Aabb::EMPTY, scratch: Default::default() }
     }
 }
 
@@ -43,15 +45,18 @@ impl FlatLists {
         self.events.iter_mut().for_each(Vec::clear);
         self.ranks.clear();
         append(&mut self.events, &mut self.ranks, count);
-        self.take(boxes, true);
+        self.place(boxes);
+        self.settle(true, How::Adaptive);
     }
 
     /// Takes the boxes' new places; there are as many as before.
     pub(crate) fn refit(&mut self, boxes: impl Fn(u32) -> Aabb) -> Inversions {
-        self.take(boxes, false)
+        self.place(boxes);
+        self.settle(false, How::Adaptive)
     }
 
-    fn take(&mut self, boxes: impl Fn(u32) -> Aabb, fresh: bool) -> Inversions {
+    /// Writes the boxes' new places; the lists are then out of order until [`FlatLists::settle`].
+    pub(crate) fn place(&mut self, boxes: impl Fn(u32) -> Aabb) {
         let [x, y, z] = &mut self.events;
         let mut lists = ListMut { events: [x, y, z], ranks: &mut self.ranks };
         let mut bounds = Aabb::EMPTY;
@@ -64,7 +69,13 @@ impl FlatLists {
             lists.place(number, aabb);
         }
         self.bounds = bounds;
-        lists.settle(fresh)
+    }
+
+    /// Sorts the lists, which are in no order that helps when `fresh`.
+    pub(crate) fn settle(&mut self, fresh: bool, how: How) -> Inversions {
+        let [x, y, z] = &mut self.events;
+        let mut lists = ListMut { events: [x, y, z], ranks: &mut self.ranks };
+        lists.settle_long(&mut self.scratch, fresh, how)
     }
 
     /// Number of boxes.

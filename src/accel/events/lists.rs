@@ -69,9 +69,10 @@ pub(crate) fn place(events: &mut [Event], ranks: [u32; 2], ends: [f32; 2]) {
 /// What it took to bring lists back into order.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Inversions {
-    /// Pairs of neighbours that were swapped: how far the order before the motion was from the one after.
+    /// Pairs of neighbours that were swapped: how far the order before the motion was from the one after. For lists that were sorted as a
+    /// whole, what was counted until then, or two thirds of the sum of the distances that events moved: that sum is the swaps at least and twice them at most.
     pub swaps: u64,
-    /// Lists whose swaps passed n log n and that were sorted as a whole instead; their further swaps are not counted.
+    /// Lists that were sorted as a whole, since insertion would have cost more.
     pub whole: u64,
 }
 

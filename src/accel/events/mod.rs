@@ -28,6 +28,7 @@ mod config;
 mod flat;
 mod lists;
 mod local;
+mod long;
 mod ranks;
 mod ray;
 mod refit;
@@ -42,6 +43,7 @@ pub(crate) use ray::EventRay;
 pub use boxes::EventBoxes;
 pub use config::{EventsConfig, Form};
 pub use lists::Inversions;
+pub(crate) use long::How;
 pub use state::EventState;
 use state::Seat;
 

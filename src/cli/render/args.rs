@@ -66,7 +66,7 @@ pub(crate) struct RenderArgs {
     /// Colour resolution of .y4m
     #[arg(long, value_name = "KIND", default_value = "420", value_parser = chroma())]
     pub(super) chroma: Chroma,
-    /// How structures are kept good: async, refit, rebuild or swap-every=K; changes no pixel
+    /// How structures are kept good: async, auto (looks at the animation beforehand), refit, rebuild or swap-every=K; changes no pixel
     #[arg(long, value_name = "NAME", default_value = "async", value_parser = values::policy)]
     pub(super) policy: RebuildPolicy,
     /// Print one JSON object with counts and times

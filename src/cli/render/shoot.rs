@@ -98,7 +98,10 @@ struct Shots<'a> {
 impl<'a> Shots<'a> {
     fn new(plan: &'a Plan, settings: &'a Settings) -> Result<Self, CliError> {
         let mut frames = FrameLoop::new(settings.frame_config(plan.policy))?;
-        frames.add(Arc::clone(&plan.scene), DAffine3::IDENTITY);
+        let actor = frames.add(Arc::clone(&plan.scene), DAffine3::IDENTITY);
+        if let [only] = plan.clips[..] {
+            frames.learn(actor, &[only])?;
+        }
         let renderer = settings.pool.install(|| Renderer::new(std::slice::from_ref(&plan.scene)));
         Ok(Self { plan, settings, frames, renderer })
     }

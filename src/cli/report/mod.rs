@@ -44,7 +44,7 @@ pub(crate) struct ReportArgs {
     /// Fewer rays, repeats and sizes: under a minute on two cores
     #[arg(long)]
     quick: bool,
-    /// Policies that `frames` compares, by commas: refit, rebuild, async, swap-every=K [default: rebuild,refit,async]
+    /// Policies that `frames` compares, by commas: refit, rebuild, async, auto, swap-every=K [default: rebuild,refit,async,auto]
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::policy)]
     policy: Vec<RebuildPolicy>,
     /// End with exit code 1 when a stated bound or target is missed, naming which

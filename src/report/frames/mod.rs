@@ -11,6 +11,7 @@ mod plots;
 mod refits;
 mod run;
 mod shots;
+mod sorts;
 mod tables;
 
 use std::sync::Arc;
@@ -49,7 +50,8 @@ pub struct Options {
 
 impl Options {
     /// The policies compared when none are named.
-    pub const POLICIES: [RebuildPolicy; 3] = [RebuildPolicy::Rebuild, RebuildPolicy::Refit, RebuildPolicy::Async];
+    pub const POLICIES: [RebuildPolicy; 4] =
+        [RebuildPolicy::Rebuild, RebuildPolicy::Refit, RebuildPolicy::Async, RebuildPolicy::Auto];
 
     fn config(&self, policy: RebuildPolicy) -> FrameConfig {
         FrameConfig {
@@ -67,7 +69,7 @@ impl Options {
     }
 }
 
-/// Measures `plays`, or [`Play::defaults`] when there are none, from a thread of the current rayon pool.
+/// Measures `plays`, or [`Play::defaults`] and the sorting of event lists when there are none, from a thread of the current rayon pool.
 ///
 /// # Errors
 /// When `monitor` ends it, a scene does not load or a frame cannot be made.
@@ -81,6 +83,7 @@ pub fn report(plays: &[Play], options: &Options, monitor: &mut dyn Monitor) -> R
         structures: vec![options.accel.clone(), options.top.clone()],
     };
     let mut report = Report::new(Kind::Frames, settings);
+    let asked = !plays.is_empty();
     let plays = match plays {
         [] => Play::defaults(options.quick)?,
         given if options.quick => given.iter().map(|play| play.clone().shortened(QUICK_FRAMES)).collect(),
@@ -103,8 +106,14 @@ pub fn report(plays: &[Play], options: &Options, monitor: &mut dyn Monitor) -> R
         played.push(done);
         refits.extend(refits::measure(play, bandwidth, options, monitor)?);
     }
+    let sorts = if asked { Vec::new() } else { sorts::measure(options.quick, monitor)? };
     report.checks = checks::checks(&played, &refits);
-    report.tables = vec![tables::summary(&played), tables::refits(&refits, bandwidth), tables::frames(&played)];
+    report.tables = vec![tables::summary(&played), tables::refits(&refits, bandwidth), sorts::table(&sorts)];
+    report.tables.push(tables::frames(&played));
+    if !sorts.is_empty() {
+        report.checks.extend(sorts::checks(&sorts));
+        report.plots.push(sorts::plot(&sorts));
+    }
     report.tables.retain(|table| !table.rows.is_empty());
     Ok(report)
 }

@@ -33,6 +33,9 @@ pub(super) struct Run {
     pub(super) counts: LoopCounts,
     /// Rays cast over all frames, once each.
     pub(super) rays: usize,
+    /// Trees learnt of clips beforehand, and the seconds it took.
+    pub(super) trees: usize,
+    pub(super) learning_s: f64,
 }
 
 /// Plays all frames under `policy`.
@@ -47,7 +50,15 @@ pub(super) fn run(
     monitor: &mut dyn Monitor,
 ) -> Result<Run, ReportError> {
     let mut frames = play.begin(options.config(policy))?;
-    let mut out = Run { policy, frames: Vec::new(), counts: frames.counts(), rays: 0 };
+    let mut out = Run { policy, frames: Vec::new(), counts: frames.counts(), rays: 0, trees: 0, learning_s: 0.0 };
+    if policy == RebuildPolicy::Auto {
+        monitor.begin(&format!("{}: {policy}: learning the clips", play.name))?;
+        let began = Instant::now();
+        for (actor, clip) in (0..).zip(play.clips(0)) {
+            out.trees += frames.learn(actor, clip.map(|c| c.clip).as_slice())?;
+        }
+        out.learning_s = began.elapsed().as_secs_f64();
+    }
     for frame in 0..play.frames {
         if frame % 16 == 0 {
             monitor.begin(&format!("{}: {policy}: frame {frame} of {}", play.name, play.frames))?;

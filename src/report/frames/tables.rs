@@ -30,6 +30,8 @@ const SUMMARY: &[Column] = &[
     Column::new("dropped", "dropped", Role::Note, 0),
     Column::new("age", "tree age, median", Role::Note, 0),
     Column::new("age_max", "most", Role::Note, 0),
+    Column::new("trees", "trees learnt", Role::Note, 0),
+    Column::new("learning_ms", "learning [ms]", Role::Note, 0),
     Column::new("rays", "rays a frame", Role::Note, 0),
     Column::new("differences", "frames that answer otherwise", Role::Less, 0),
 ];
@@ -117,6 +119,8 @@ impl Played {
             run.counts.rebuilds_dropped.into(),
             age.median().into(),
             age.most().into(),
+            (run.trees > 0).then_some(run.trees).into(),
+            (run.trees > 0).then_some(run.learning_s * 1e3).into(),
             (run.rays / run.frames.len().max(1)).into(),
             run.differences(&self.runs[0]).into(),
         ]
