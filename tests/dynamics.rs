@@ -202,6 +202,23 @@ fn a_still_scene_is_built_once_and_never_touched_again() {
 }
 
 #[test]
+fn rigid_parts_move_without_a_refit_and_share_one_tree() {
+    let rays = rays(200);
+    let mut frames = looped("bvh2", RebuildPolicy::Async, bodies(40));
+    for time_s in TIMES {
+        let world = frames.advance(&[&at(time_s)]).unwrap().0;
+        assert_eq!(world.group_count(), 40);
+        let answers = cast(SimdLevel::Scalar, &world, &rays);
+        assert!(answers.iter().any(|answer| answer.0.is_some()));
+        assert!(levels().all(|level| cast(level, &world, &rays) == answers), "at {time_s}");
+        world.validate().unwrap();
+    }
+    let counts = frames.counts();
+    assert_eq!((counts.builds, counts.refits, counts.leaf_refits, counts.rebuilds_begun), (0, 0, 0, 0), "{counts:?}");
+    assert_eq!(counts.moves, 40 * (TIMES.len() as u64 - 1));
+}
+
+#[test]
 fn event_lists_are_sorted_only_where_the_level_over_groups_is_made_of_them() {
     for top in TopKind::ALL {
         let mut frames = FrameLoop::new(config("bvh2", top.name(), RebuildPolicy::Refit, 1)).unwrap();

@@ -60,6 +60,9 @@ fn at(frame: u32) -> [ActiveClip; 1] {
     [ActiveClip { clip: ClipId(0), time_s: f64::from(frame % 97) * 0.02 }]
 }
 
+/// Without optimisation a fifth of them.
+const FRAMES: u32 = if cfg!(debug_assertions) { 2_000 } else { 10_000 };
+
 #[test]
 fn ten_thousand_frames_swap_trees_exchange_scenes_and_keep_the_memory_they_had() {
     let scenes = [burst(120), bodies(6), burst(60)].map(Arc::new);
@@ -70,7 +73,7 @@ fn ten_thousand_frames_swap_trees_exchange_scenes_and_keep_the_memory_they_had()
             frames.add(scene.clone(), DAffine3::IDENTITY);
         }
         let mut held = Vec::new();
-        for frame in 0..10_000 {
+        for frame in 0..FRAMES {
             if frame % 53 == 7 {
                 let actor = usize::from(frame % 2 == 1);
                 frames.replace(actor, scenes[(frame / 53) as usize % 3].clone(), DAffine3::IDENTITY);
@@ -88,10 +91,10 @@ fn ten_thousand_frames_swap_trees_exchange_scenes_and_keep_the_memory_they_had()
         }
         let counts = frames.counts();
         if policy == RebuildPolicy::Async {
-            assert!(counts.rebuilds_begun > 50, "{counts:?}");
+            assert!(counts.rebuilds_begun > 10, "{counts:?}");
         } else {
-            assert!(counts.swaps > 10_000, "{counts:?}");
-            assert!(counts.rebuilds_dropped > 100, "{counts:?}");
+            assert!(counts.swaps > u64::from(FRAMES), "{counts:?}");
+            assert!(counts.rebuilds_dropped > u64::from(FRAMES) / 100, "{counts:?}");
         }
         assert!(counts.swaps + counts.rebuilds_dropped <= counts.rebuilds_begun, "{counts:?}");
         let half = held.len() / 2;

@@ -17,6 +17,7 @@ pub mod list;
 mod packet;
 mod query;
 mod registry;
+mod rigid;
 mod run;
 mod sah;
 mod shapes;
@@ -31,6 +32,7 @@ pub use packet::PACKET;
 pub(crate) use packet::PacketBoxes;
 pub use query::{AnyHit, Closest, HitSink, TravRay};
 pub use registry::{AccelKind, AccelSpec, AnyAccel, SpecError};
+pub(crate) use rigid::{RigidPlace, RigidTree};
 pub use topology::Cut;
 
 pub use crate::geom::{Forms, Precision};

@@ -55,6 +55,14 @@ pub(super) fn placement<'a>(scene: &'a Scene, pose: &'a Pose, instance: PartInst
     Placement::Whole(world_from_instance(scene, pose, instance))
 }
 
+/// The matrix that takes every rest position of a part instance to the world, if one does: no skin, no morph targets.
+pub(crate) fn whole_placement(scene: &Scene, pose: &Pose, instance: PartInstance) -> Option<DAffine3> {
+    match placement(scene, pose, instance) {
+        Placement::Whole(matrix) if scene.part(instance).targets.is_empty() => Some(matrix),
+        _ => None,
+    }
+}
+
 /// The global transform of an instance's node with that of its copy applied first.
 fn world_from_instance(scene: &Scene, pose: &Pose, instance: PartInstance) -> DAffine3 {
     let world_from_node = pose.world_from_node(instance.node);

@@ -18,6 +18,7 @@ mod transform;
 pub use bounds::animation_bounds;
 pub use class::{MotionClass, classify};
 pub use clock::loop_time;
+pub(crate) use deform::whole_placement;
 pub use deform::{
     DEFORM_GRAIN, deform, deform_parallel, deform_parallel_as, deform_range, deform_range_as, deform_range_at,
     deform_unrounded,

@@ -164,7 +164,13 @@ impl Snapshot {
         world.places = parts.iter().map(|_| Place { group: 0, first_vertex: 0, vertex_count: 0 }).collect();
         for part in parts.iter().filter(|p| p.len() > 0) {
             let (layout, positions) = (part.shape.layout.clone(), part.positions.clone());
-            world.groups.push(GroupFrame { layout, positions, accel: part.accel(spec)?, bounds: part.bounds });
+            world.groups.push(GroupFrame {
+                layout,
+                positions,
+                accel: part.accel(spec)?,
+                rigid: None,
+                bounds: part.bounds,
+            });
         }
         world.top = Top::default();
         world.top.rebuild(*top, &world.groups);

@@ -75,6 +75,8 @@ pub struct LoopCounts {
     pub refits: u64,
     /// Triangles whose place in a leaf was written by these refits.
     pub leaf_refits: u64,
+    /// Parts that moved as a whole by their matrix and box alone.
+    pub moves: u64,
     /// Structures built before tracing: first builds, and those of a policy or structure that cannot refit.
     pub builds: u64,
     /// Rebuilds handed to the background builder.

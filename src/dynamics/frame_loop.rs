@@ -192,6 +192,7 @@ impl FrameLoop {
         let work = self.stage.update(&self.spec, self.config.policy == RebuildPolicy::Rebuild, frame)?;
         self.counts.refits += work.refits;
         self.counts.leaf_refits += work.leaf_refits;
+        self.counts.moves += work.moves;
         self.counts.builds += work.builds;
         self.counts.swaps += work.swaps;
         let quality = self.stage.quality();

@@ -10,10 +10,11 @@ use super::{
     layout::Shape,
     phases::Phases,
     pool::Pool,
+    rigid::{Rigid, RigidPart},
 };
 use crate::{
-    accel::{AccelSpec, AnyAccel, Refit},
-    anim::ActiveClip,
+    accel::{AccelSpec, AnyAccel, Refit, RigidPlace},
+    anim::{ActiveClip, whole_placement},
     geom::Precision,
     scene::ClipId,
     world::GroupFrame,
@@ -48,6 +49,8 @@ pub(super) struct Group {
     /// The clip and the number of its tree that is in use.
     phase: Option<(ClipId, usize)>,
     rebuild: Rebuild,
+    /// Of a part that moves as a whole: its tree, and where it is.
+    rigid: Option<Rigid>,
     /// What the last `update` did, or why it failed.
     pub(super) outcome: Result<Work, FrameError>,
 }
@@ -78,12 +81,13 @@ enum Rebuild {
 pub(super) struct Work {
     pub(super) refits: u64,
     pub(super) leaf_refits: u64,
+    pub(super) moves: u64,
     pub(super) builds: u64,
     pub(super) swaps: u64,
 }
 
 impl Group {
-    pub(super) fn new(shape: Shape, key: Vec<MemberKey>, actor: Option<usize>) -> Self {
+    pub(super) fn new(shape: Shape, key: Vec<MemberKey>, actor: Option<usize>, rigid: Option<Rigid>) -> Self {
         Self {
             shape,
             key,
@@ -101,6 +105,7 @@ impl Group {
             playing: None,
             phase: None,
             rebuild: Rebuild::Idle,
+            rigid,
             outcome: Ok(Work::default()),
         }
     }
@@ -111,6 +116,12 @@ impl Group {
         self.deformed = self.accel.is_none() || self.moved(actors);
         if !self.deformed {
             return;
+        }
+        if let (Some(rigid), Some(chunk)) = (&mut self.rigid, self.shape.chunks.first()) {
+            let actor = &actors[chunk.actor];
+            rigid.is_fast = precision == Precision::Fast;
+            rigid.world_from_part =
+                whole_placement(&actor.scene, &actor.pose, chunk.part).unwrap_or(rigid.world_from_part);
         }
         self.playing = self.actor.and_then(|actor| actors[actor].sole_clip());
         let count = self.shape.layout.vertex_count;
@@ -144,7 +155,25 @@ impl Group {
         }
     }
 
+    /// Takes the matrix and the box of this frame.
+    fn move_whole(&mut self, rigid: &mut Rigid) -> Work {
+        if !self.deformed {
+            return Work::default();
+        }
+        let tree = &rigid.part.tree;
+        rigid.bounds = rigid.part.bounds(&self.positions);
+        rigid.place = RigidPlace::new(tree, &rigid.world_from_part, rigid.bounds, rigid.is_fast);
+        let first = self.accel.is_none();
+        self.accel = Some(rigid.part.nothing.clone());
+        Work { moves: u64::from(!first), ..Work::default() }
+    }
+
     fn try_update(&mut self, spec: &AccelSpec, rebuild_always: bool, frame: u64) -> Result<Work, FrameError> {
+        if let Some(mut rigid) = self.rigid.take() {
+            let work = self.move_whole(&mut rigid);
+            self.rigid = Some(rigid);
+            return Ok(work);
+        }
         match mem::take(&mut self.rebuild) {
             Rebuild::Finished(built) => return self.swap(*built, spec, frame),
             other => self.rebuild = other,
@@ -152,7 +181,8 @@ impl Group {
         if !self.deformed {
             return Ok(Work::default());
         }
-        if let Some((number, tree)) = self.playing.and_then(|now| self.phases.iter().find_map(|phases| phases.at(now))) {
+        if let Some((number, tree)) = self.playing.and_then(|now| self.phases.iter().find_map(|phases| phases.at(now)))
+        {
             let (tree, phase) = (tree.clone(), self.playing.map(|now| (now.clip, number)));
             return self.follow(&tree, phase, spec, frame);
         }
@@ -228,8 +258,11 @@ impl Group {
     /// What the world holds of this frame; `None` before the first `update`.
     pub(super) fn frame(&self) -> Option<GroupFrame> {
         let accel = self.accel.clone()?;
-        let bounds = accel.bounds();
-        Some(GroupFrame { layout: self.shape.layout.clone(), positions: self.positions.clone(), accel, bounds })
+        let (rigid, bounds) = match &self.rigid {
+            Some(rigid) => (Some((rigid.part.tree.clone(), rigid.place)), rigid.bounds),
+            None => (None, accel.bounds()),
+        };
+        Some(GroupFrame { layout: self.shape.layout.clone(), positions: self.positions.clone(), accel, rigid, bounds })
     }
 
     /// How much dearer rays are than right after the last build, by surface areas.
@@ -239,12 +272,16 @@ impl Group {
 
     /// Frames between `frame` and the one that the structure was built from; 0 when nothing moved since.
     pub(super) fn tree_age(&self, frame: u64) -> u64 {
-        if self.moved_since_build { frame - self.built_of } else { 0 }
+        if self.moved_since_build && self.rigid.is_none() { frame - self.built_of } else { 0 }
     }
 
     /// True when a background rebuild could improve the structure.
     pub(super) fn wants_rebuild(&self) -> bool {
-        self.moved_since_build && self.phase.is_none() && self.triangle_count() > 0 && matches!(self.rebuild, Rebuild::Idle)
+        self.rigid.is_none()
+            && self.moved_since_build
+            && self.phase.is_none()
+            && self.triangle_count() > 0
+            && matches!(self.rebuild, Rebuild::Idle)
     }
 
     /// Takes the trees of a clip in place of those that it had for it.
@@ -256,6 +293,11 @@ impl Group {
     /// The actor that moves the group.
     pub(super) fn actor(&self) -> Option<usize> {
         self.actor
+    }
+
+    /// What of a part that moves as a whole its copies share.
+    pub(super) fn rigid_part(&self) -> Option<&Arc<RigidPart>> {
+        self.rigid.as_ref().map(|rigid| &rigid.part)
     }
 
     /// True while the builder has this group.

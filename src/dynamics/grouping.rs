@@ -2,7 +2,9 @@
 //!
 //! - Static parts of all actors form one group: its tree is built once, over everything, and never touched again.
 //! - What moves is grouped by actor, since an actor that holds its pose then costs nothing.
-//! - Within an actor, parts that move as one (the same nearest moving ancestor, or the same skin) and have
+//! - Where all that moves of an actor are rigid parts, each is alone, with a tree in its own space that all its copies share (`accel::RigidTree`): its
+//!   motion costs a matrix and a box, however many triangles it has.
+//! - Within another actor, parts that move as one (the same nearest moving ancestor, or the same skin) and have
 //!   many triangles form a group of their own: their tree keeps its quality however the rest moves. Small
 //!   movers go together, because a ray that enters a group pays about as much as for a few nodes, and boxes of
 //!   attached parts overlap: one tree over a figure and what it carries beats ten.
@@ -24,6 +26,8 @@ pub(super) struct GroupPlan {
     /// The actor that moves it; `None` for the static group.
     pub(super) actor: Option<usize>,
     pub(super) members: Vec<InstanceId>,
+    /// One part that moves as a whole: it keeps a tree in its own space.
+    pub(super) is_rigid: bool,
 }
 
 /// What of an actor decides on its groups.
@@ -51,28 +55,52 @@ pub(super) enum Grouping {
 
 /// The groups of `actors`: static first, then in order of actor and first member. Every instance is in one.
 pub(super) fn plan(actors: &[ActorParts<'_>], grouping: Grouping) -> Vec<GroupPlan> {
-    let mut fixed = GroupPlan { actor: None, members: Vec::new() };
+    let mut fixed = GroupPlan { actor: None, members: Vec::new(), is_rigid: false };
     let mut moving = Vec::new();
     for (number, actor) in actors.iter().enumerate() {
         let parts = || (actor.first_instance..).map(InstanceId).zip(&actor.scene.instances).zip(actor.classes);
         match grouping {
             Grouping::ByMotion => {
                 fixed.members.extend(parts().filter(|&(_, &c)| c == MotionClass::Static).map(|((id, _), _)| id));
+                let apart = moves_as_wholes(actor);
                 let movers = parts().filter(|&(_, &c)| c != MotionClass::Static).map(|((id, &part), _)| (id, part));
-                moving.extend(by_mover(actor.scene, movers).map(|members| GroupPlan { actor: Some(number), members }));
+                let group = |members, is_rigid| GroupPlan { actor: Some(number), members, is_rigid };
+                if apart {
+                    moving.extend(movers.map(|(id, _)| group(vec![id], true)));
+                } else {
+                    moving.extend(by_mover(actor.scene, movers).map(|members| group(members, false)));
+                }
             }
             #[cfg(test)]
             Grouping::Single => {
-                moving.extend(parts().map(|((id, _), _)| GroupPlan { actor: Some(number), members: vec![id] }));
+                moving.extend(parts().map(|((id, _), _)| GroupPlan {
+                    actor: Some(number),
+                    members: vec![id],
+                    is_rigid: false,
+                }));
             }
             #[cfg(test)]
             Grouping::ByActor => {
-                moving.push(GroupPlan { actor: Some(number), members: parts().map(|((id, _), _)| id).collect() });
+                let members = parts().map(|((id, _), _)| id).collect();
+                moving.push(GroupPlan { actor: Some(number), members, is_rigid: false });
             }
         }
     }
     let groups = std::iter::once(fixed).chain(moving);
     groups.filter(|group| !group.members.is_empty()).collect()
+}
+
+/// True when all that moves of an actor are parts that one matrix each places.
+///
+/// What an actor carries beside deforming parts goes with these instead, as the module says.
+fn moves_as_wholes(actor: &ActorParts<'_>) -> bool {
+    let mut moving =
+        actor.scene.instances.iter().zip(actor.classes).filter(|&(_, &class)| class != MotionClass::Static);
+    moving.all(|(&instance, &class)| {
+        let part = actor.scene.part(instance);
+        let skinned = actor.scene.nodes[instance.node.index()].skin.is_some() && part.influences.is_some();
+        class == MotionClass::Rigid && part.targets.is_empty() && !skinned
+    })
 }
 
 /// What a moving part moves with.

@@ -14,6 +14,7 @@ mod grouping;
 mod layout;
 mod phases;
 mod pool;
+mod rigid;
 mod stage;
 mod sync;
 #[cfg(test)]

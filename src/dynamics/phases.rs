@@ -90,7 +90,8 @@ impl Phases {
             None => f64::INFINITY,
         };
         let mut trees: Vec<Option<AnyAccel>> = trees.into_iter().map(Some).collect();
-        let phase = |(tree, until): (usize, usize)| Some(Phase { until_s: end(until), accel: Arc::new(trees[tree].take()?) });
+        let phase =
+            |(tree, until): (usize, usize)| Some(Phase { until_s: end(until), accel: Arc::new(trees[tree].take()?) });
         Ok(Self { clip, trees: runs.into_iter().filter_map(phase).collect() })
     }
 

@@ -11,6 +11,7 @@ use super::{
     grouping::{ActorParts, GroupPlan, Grouping, plan},
     layout::{Member, Shape, check, lay_out},
     phases::{self, LEAST, Phases, Sample},
+    rigid::{Rigid, RigidPart},
 };
 use crate::{
     accel::AccelSpec,
@@ -92,6 +93,8 @@ impl Stage {
             std::mem::take(&mut self.groups).into_iter().map(|group| (group.key.clone(), group)).collect();
         let mut places = vec![Place { group: 0, first_vertex: 0, vertex_count: 0 }; instances.len()];
         let firsts = self.first_instances();
+        let mut parts: HashMap<_, Arc<RigidPart>> =
+            old.values().filter_map(Group::rigid_part).map(|part| (part.own_number(), part.clone())).collect();
         for (number, plan) in (0..).zip(&plans) {
             let member = |id: InstanceId| {
                 let WorldInstance { actor, part } = instances[id.0 as usize];
@@ -103,7 +106,8 @@ impl Stage {
                 group
             } else {
                 self.next_epoch += 1;
-                Group::new(lay_out(plan, self.next_epoch, member)?, key, plan.actor)
+                let rigid = self.rigid(plan, &instances, &mut parts)?;
+                Group::new(lay_out(plan, self.next_epoch, member)?, key, plan.actor, rigid)
             };
             group.shape.note_places(number, member, &mut places);
             self.groups.push(group);
@@ -113,6 +117,25 @@ impl Stage {
         self.settled = true;
         self.boxes_version += 1;
         Ok(())
+    }
+
+    /// What moves a group of one part as a whole, with the tree that its copies share.
+    fn rigid(
+        &self,
+        plan: &GroupPlan,
+        instances: &[WorldInstance],
+        parts: &mut HashMap<(usize, u32, u32), Arc<RigidPart>>,
+    ) -> Result<Option<Rigid>, FrameError> {
+        let (true, [id]) = (plan.is_rigid, &plan.members[..]) else { return Ok(None) };
+        let WorldInstance { actor, part } = instances[id.0 as usize];
+        let scene = &self.actors[actor as usize].scene;
+        let number = RigidPart::number(scene, part);
+        let shared = match parts.get(&number).filter(|known| known.is_of(scene, part)) {
+            Some(known) => known.clone(),
+            None => Arc::new(RigidPart::new(scene, part)?),
+        };
+        parts.insert(number, shared.clone());
+        Ok(Some(Rigid::new(shared)))
     }
 
     #[expect(clippy::cast_possible_truncation, reason = "there are at most as many actors as fit in memory")]
@@ -215,6 +238,7 @@ impl Stage {
             let work = std::mem::replace(&mut group.outcome, Ok(Work::default()))?;
             sum.refits += work.refits;
             sum.leaf_refits += work.leaf_refits;
+            sum.moves += work.moves;
             sum.builds += work.builds;
             sum.swaps += work.swaps;
         }

@@ -3,7 +3,7 @@ use std::sync::Arc;
 use glam::Vec3;
 
 use crate::{
-    accel::AnyAccel,
+    accel::{AnyAccel, RigidPlace, RigidTree},
     geom::{Aabb, InstanceId, PrimId, Triangles},
 };
 
@@ -46,6 +46,8 @@ pub(crate) struct GroupFrame {
     pub(crate) layout: Arc<GroupLayout>,
     pub(crate) positions: Arc<Vec<Vec3>>,
     pub(crate) accel: Arc<AnyAccel>,
+    /// Of a part that moves as a whole: the tree in its own space, which answers rays in `accel`'s stead, and where the part is.
+    pub(crate) rigid: Option<(Arc<RigidTree>, RigidPlace)>,
     /// The least box around every triangle that can be hit (those with finite corners), or a larger one.
     pub(crate) bounds: Aabb,
 }

@@ -133,15 +133,34 @@ impl World {
 impl GroupFrame {
     #[inline(always)]
     fn closest_packet<S: Simd>(&self, rays: &[TravRay], active: u32, best: &mut [Closest]) {
-        let sinks = [GroupSink { layout: &self.layout, filter: Unfiltered }; PACKET];
         let prims = self.triangles();
+        if let Some((tree, place)) = &self.rigid {
+            let sink = GroupSink { layout: &self.layout, filter: Unfiltered };
+            for (i, ray) in rays.iter().enumerate() {
+                if (active >> i) & 1 == 1 {
+                    tree.closest::<S, _>(place, &prims, ray, &mut best[i], &sink);
+                }
+            }
+            return;
+        }
+        let sinks = [GroupSink { layout: &self.layout, filter: Unfiltered }; PACKET];
         self.accel.closest_packet::<S, (), _>(&prims, rays, active, best, &sinks[..rays.len()], &mut ());
     }
 
     #[inline(always)]
     fn occluded_packet<S: Simd>(&self, rays: &[TravRay], active: u32) -> u32 {
-        let sinks = [GroupSink { layout: &self.layout, filter: Unfiltered }; PACKET];
         let prims = self.triangles();
+        if let Some((tree, place)) = &self.rigid {
+            let sink = GroupSink { layout: &self.layout, filter: Unfiltered };
+            let mut blocked = 0;
+            for (i, ray) in rays.iter().enumerate() {
+                if (active >> i) & 1 == 1 {
+                    blocked |= u32::from(tree.occluded::<S, _>(place, &prims, ray, &sink)) << i;
+                }
+            }
+            return blocked;
+        }
+        let sinks = [GroupSink { layout: &self.layout, filter: Unfiltered }; PACKET];
         self.accel.occluded_packet::<S, (), _>(&prims, rays, active, &sinks[..rays.len()], &mut ())
     }
 }

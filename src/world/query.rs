@@ -76,12 +76,18 @@ impl GroupFrame {
     #[inline(always)]
     fn closest<S: Simd, F: Filter>(&self, ray: &TravRay, best: &mut Closest, filter: F) {
         let sink = GroupSink { layout: &self.layout, filter };
-        self.accel.closest::<S, (), _>(&self.triangles(), ray, best, &sink, &mut ());
+        match &self.rigid {
+            Some((tree, place)) => tree.closest::<S, _>(place, &self.triangles(), ray, best, &sink),
+            None => self.accel.closest::<S, (), _>(&self.triangles(), ray, best, &sink, &mut ()),
+        }
     }
 
     #[inline(always)]
     fn occluded<S: Simd, F: Filter>(&self, ray: &TravRay, filter: F) -> bool {
         let sink = GroupSink { layout: &self.layout, filter };
-        self.accel.occluded::<S, (), _>(&self.triangles(), ray, &sink, &mut ())
+        match &self.rigid {
+            Some((tree, place)) => tree.occluded::<S, _>(place, &self.triangles(), ray, &sink),
+            None => self.accel.occluded::<S, (), _>(&self.triangles(), ray, &sink, &mut ()),
+        }
     }
 }

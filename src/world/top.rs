@@ -281,6 +281,7 @@ mod tests {
             layout: Arc::new(GroupLayout { topology_epoch, ..GroupLayout::default() }),
             positions: Arc::default(),
             accel: accel.clone(),
+            rigid: None,
             bounds,
         };
         (0..).zip(boxes).map(group).collect()

@@ -44,8 +44,7 @@ impl<W: RankWord> ListMut<'_, W> {
 
     /// Sorts the lists and writes the ranks. `fresh` lists are in no order that helps.
     pub(super) fn settle(&mut self, fresh: bool) -> Inversions {
-        let done =
-            self.events.iter_mut().map(|list| order(list, fresh)).fold(Inversions::default(), Inversions::plus);
+        let done = self.events.iter_mut().map(|list| order(list, fresh)).fold(Inversions::default(), Inversions::plus);
         if fresh || done != Inversions::default() {
             self.write_ranks();
         }

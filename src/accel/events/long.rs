@@ -66,7 +66,8 @@ impl Scratch {
             How::Radix | How::Comparison => (false, 0),
         };
         if begins {
-            let swaps = dispatch(SimdLevel::best(), Insert { events, most: ends, spans: &mut self.spans, all: &mut self.all });
+            let swaps =
+                dispatch(SimdLevel::best(), Insert { events, most: ends, spans: &mut self.spans, all: &mut self.all });
             self.last = Some(swaps);
             if swaps <= ends {
                 return Inversions { swaps, whole: 0 };

@@ -67,9 +67,11 @@ struct Drift {
 
 impl Drift {
     fn new(boxes: u32) -> Self {
-        let unit = |seed| move |i: u32| {
-            let mut random = Random::new(seed, u64::from(i));
-            DVec3::new(random.unit(), random.unit(), random.unit()) * 2.0 - DVec3::ONE
+        let unit = |seed| {
+            move |i: u32| {
+                let mut random = Random::new(seed, u64::from(i));
+                DVec3::new(random.unit(), random.unit(), random.unit()) * 2.0 - DVec3::ONE
+            }
         };
         let (places, ways) = ((0..boxes).map(unit(91)).collect(), (0..boxes).map(unit(92)).collect());
         Self { places, ways, size: libm::cbrt(1.0 / f64::from(boxes.max(1))) }
@@ -168,7 +170,15 @@ pub(super) fn checks(rows: &[SortRow]) -> Vec<Check> {
     let worst = rows.iter().filter_map(SortRow::over_better).reduce(f64::max);
     let still = rows.iter().filter(|row| row.inversions <= 0.01).filter_map(SortRow::comparisons).reduce(f64::min);
     vec![
-        Check::new("sorting event lists again / the better of insertion and radix, at the worst motion", Bound::AtMost(1.1), worst),
-        Check::new("comparison sort / sorting again, at 0.01 inversions an event or fewer", Bound::AtLeast(10.0), still),
+        Check::new(
+            "sorting event lists again / the better of insertion and radix, at the worst motion",
+            Bound::AtMost(1.1),
+            worst,
+        ),
+        Check::new(
+            "comparison sort / sorting again, at 0.01 inversions an event or fewer",
+            Bound::AtLeast(10.0),
+            still,
+        ),
     ]
 }
