@@ -45,27 +45,27 @@ impl Options {
 
     /// Repeats of a time.
     fn repeats(&self) -> usize {
-        if self.quick { 2 } else { 5 }
+        if self.quick { 2 } else { 3 }
     }
 
     /// Rays of a class.
     fn rays(&self) -> usize {
-        if self.quick { 16_384 } else { 262_144 }
+        if self.quick { 16_384 } else { 131_072 }
     }
 
     /// Width and height of pictures.
     fn picture(&self) -> [u32; 2] {
-        if self.quick { [160, 90] } else { [640, 360] }
+        if self.quick { [160, 90] } else { [480, 270] }
     }
 
     /// Samples a pixel of a picture without noise to speak of.
     fn converged(&self) -> u32 {
-        if self.quick { 64 } else { 512 }
+        if self.quick { 64 } else { 256 }
     }
 
     /// Work (as `Counts::work` has it) that a point may spend on one repeat of one class.
     fn budget(&self) -> u64 {
-        if self.quick { 400_000 } else { 8_000_000 }
+        if self.quick { 400_000 } else { 4_000_000 }
     }
 }
 
