@@ -29,7 +29,7 @@ pub(crate) fn check(trial: &str, structure: &str, found: &Mistakes) {
 }
 
 /// The largest share of each kind of mistake among some structures, and whose it is.
-pub(crate) fn worst<'a>(found: impl Iterator<Item = (&'a str, &'a Mistakes)> + Clone) -> String {
+pub(crate) fn worst<'a>(found: &(impl Iterator<Item = (&'a str, &'a Mistakes)> + Clone)) -> String {
     let largest = |what: &str, of: fn(&Mistakes) -> u64| {
         let share = |m: &Mistakes| of(m) as f64 / m.rays.max(1) as f64;
         let (name, most) =

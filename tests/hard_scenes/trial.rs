@@ -231,7 +231,7 @@ impl Trial<'_> {
             }
         }
         let fast = all().flat_map(|(name, found)| found.fast.iter().map(move |fast| (name, fast)));
-        println!("{}: fast, the worst of all: {}", self.name, worst(fast.clone()));
+        println!("{}: fast, the worst of all: {}", self.name, worst(&fast));
         for (name, Found { exact, .. }) in all() {
             assert!(exact.none(), "{}: {name}: {exact}", self.name);
         }

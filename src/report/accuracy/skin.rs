@@ -75,10 +75,12 @@ const FAST_ERROR: f64 = 1e-5;
 pub(super) fn in_short(rows: &[SkinRow]) -> Option<String> {
     let worst = |form: Precision| rows.iter().filter(|r| r.forms.deform == form).map(|r| r.max).reduce(f64::max);
     let (exact, fast) = (worst(Precision::Exact)?, worst(Precision::Fast)?);
+    let drift = rows.iter().map(|r| r.drift).fold(0.0, f64::max);
     Some(format!(
-        "**Vertices:** off by at most {:.1} in 10^9 of the scene's size in exact and {:.1} in fast; none is another after 10,000 rounds but by the clock's own rounding.",
+        "**Vertices:** off by at most {:.1} in 10^9 of the scene's size in exact, {:.1} in fast; {:.1} after 10,000 rounds of the clip.",
         exact * 1e9,
-        fast * 1e9
+        fast * 1e9,
+        drift * 1e9
     ))
 }
 
