@@ -23,12 +23,12 @@ pub(crate) struct FlatLists {
     events: [Vec<Event>; 3],
     ranks: Vec<Ranks<Word>>,
     bounds: Aabb,
-    scratch: [Scratch; 3],
+    scratch: Box<[Scratch; 3]>,
 }
 
 impl Default for FlatLists {
     fn default() -> Self {
-        Self { events: Default::default(), ranks: Vec::new(), bounds: Aabb::EMPTY, scratch: Default::default() }
+        Self { events: Default::default(), ranks: Vec::new(), bounds: Aabb::EMPTY, scratch: Box::default() }
     }
 }
 

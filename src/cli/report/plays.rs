@@ -18,7 +18,7 @@ pub(super) fn read(arguments: &[String], settings: &Settings) -> Result<Vec<Play
         let (now, later) = rest.split_at(together);
         rest = later;
         plays.push(if Path::new(first).is_dir() {
-            sequence(&super::name(first, arguments).to_owned(), &frames_of(first)?, settings)?
+            sequence(super::name(first, arguments), &frames_of(first)?, settings)?
         } else if geometry::is_mesh(first) {
             let inside = folder(first).and_then(Path::file_name).map(|n| n.to_string_lossy().into_owned());
             let name = inside.filter(|_| now.len() > 1).unwrap_or_else(|| super::name(first, arguments).to_owned());

@@ -1,5 +1,9 @@
 //! Scenes made for measurements: sequences of meshes, a burst, a skinned reed.
-#![expect(clippy::cast_possible_truncation, reason = "what is made is small, what is given is checked")]
+#![expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "what is made is small and not negative, what is given is checked"
+)]
 
 use crate::{
     glam::{DMat4, DQuat, DVec3, Vec3},
