@@ -15,6 +15,9 @@ use crate::{
 /// Frames a second of the clips of scenes.
 const FPS: f64 = 60.0;
 
+/// Rigid bodies of the largest hail.
+const BODIES: usize = 10_000;
+
 /// Frames that the keys of a sequence become.
 const FRAMES: u32 = 300;
 
@@ -102,6 +105,9 @@ impl Play {
         }
         plays.push(Self::scene("burst", Arc::new(made::burst(200_000))));
         plays.push(Self::crowd("crowd of 500", &Arc::new(made::reed(48)), 500));
+        let bodies = Arc::new(builtin::load("tumble")?);
+        let copies = BODIES.div_ceil(bodies.instances.len());
+        plays.push(Self::crowd("10,000 rigid bodies", &bodies, copies));
         let shared = |path: &str| Path::new("../shared/assets").join(path);
         let man = shared("khronos/CesiumMan/glTF-Binary/CesiumMan.glb");
         for (name, path) in [("CesiumMan", man), ("Knight", shared("kaykit/Knight.glb"))] {
