@@ -40,36 +40,3 @@ impl<T> Pool<T> {
         self.kept.iter_mut().filter_map(Arc::get_mut).for_each(f);
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_buffer_is_written_again_only_when_no_reader_holds_it() {
-        let mut pool = Pool::default();
-        let first = pool.take(|| vec![1]);
-        pool.keep(first.clone());
-        let second = pool.take(|| vec![2]);
-        pool.keep(second.clone());
-        assert_eq!(*second, [2], "the first is held");
-        drop(first);
-        let third = pool.take(|| vec![3]);
-        assert_eq!(*third, [1], "the first is free again");
-        assert_eq!(*second, [2]);
-    }
-
-    #[test]
-    fn a_pool_does_not_grow_with_readers_that_never_let_go() {
-        let mut pool = Pool::default();
-        let held: Vec<_> = (0..20)
-            .map(|i| {
-                let item = pool.take(|| i);
-                pool.keep(item.clone());
-                item
-            })
-            .collect();
-        assert_eq!(pool.kept.len(), KEPT);
-        assert!(held.iter().enumerate().all(|(i, item)| **item == i));
-    }
-}

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use glam::{DAffine3, DVec3, Vec3};
 
-use super::{FrameConfig, FrameError, FrameLoop, RebuildPolicy, grouping::Grouping};
+use super::{FrameConfig, FrameError, FrameLoop, RebuildPolicy, grouping::Grouping, pool::Pool};
 use crate::{
     accel::PACKET,
     anim::ActiveClip,
@@ -113,6 +113,33 @@ fn packets_answer_as_single_rays_do() {
             assert!(blocked == blocked_singly, "{accel} at {level}");
         }
     }
+}
+
+#[test]
+fn a_buffer_is_written_again_only_when_no_reader_holds_it() {
+    let mut pool = Pool::default();
+    let first = pool.take(|| vec![1]);
+    pool.keep(first.clone());
+    let second = pool.take(|| vec![2]);
+    pool.keep(second.clone());
+    assert_eq!(*second, [2], "the first is held");
+    drop(first);
+    let third = pool.take(|| vec![3]);
+    assert_eq!(*third, [1], "the first is free again");
+    assert_eq!(*second, [2]);
+}
+
+#[test]
+fn a_pool_does_not_grow_with_readers_that_never_let_go() {
+    let mut pool = Pool::default();
+    let hold = |i| {
+        let item = pool.take(|| i);
+        pool.keep(item.clone());
+        item
+    };
+    let held: Vec<Arc<usize>> = (0..20).map(hold).collect();
+    assert!(held.iter().enumerate().all(|(i, item)| **item == i));
+    assert_eq!(held.iter().filter(|item| Arc::strong_count(item) > 1).count(), 4, "the last few");
 }
 
 #[test]
