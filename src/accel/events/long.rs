@@ -15,8 +15,12 @@ use crate::simd::{Simd, SimdLevel, Task, dispatch};
 /// Lists of fewer events are sorted by insertion or comparison: [`resort`](super::lists::resort).
 pub(super) const LONG: usize = 1 << 10;
 
-/// Inversions an event at which a radix sort costs as much as insertion.
-const CROSSOVER: u64 = 5;
+/// Events to an inversion at which a radix sort costs as much as insertion. An event out of order costs more than the events in between: the
+/// processor does not foresee it.
+const CROSSOVER: u64 = 2;
+
+/// Insertion gives up at so many times the inversions of the crossover, so that chance does not make both sorts run.
+const PATIENCE: u64 = 2;
 
 /// Spans of changed places that are remembered one by one.
 const SPANS: usize = 1 << 12;
@@ -59,9 +63,9 @@ impl Scratch {
         self.spans.clear();
         self.spans.reserve(SPANS);
         self.all = false;
-        let most = CROSSOVER * events.len() as u64;
+        let most = events.len() as u64 / CROSSOVER;
         let (begins, ends) = match how {
-            How::Adaptive => (self.last.is_none_or(|last| last <= most), most),
+            How::Adaptive => (self.last.is_none_or(|last| last <= most), PATIENCE * most),
             How::Insertion => (true, u64::MAX),
             How::Radix | How::Comparison => (false, 0),
         };
@@ -270,7 +274,7 @@ mod tests {
                     prop_assert_eq!(done, Inversions { swaps: disorder, whole: 0 });
                 }
                 prop_assert_eq!(done.whole == 1, how == How::Radix || how == How::Comparison
-                    || how == How::Adaptive && disorder > CROSSOVER * due.len() as u64);
+                    || how == How::Adaptive && disorder > PATIENCE * (due.len() as u64 / CROSSOVER));
             }
         }
     }
