@@ -132,7 +132,7 @@ fn a_buffer_is_written_again_only_when_no_reader_holds_it() {
 #[test]
 fn a_pool_does_not_grow_with_readers_that_never_let_go() {
     let mut pool = Pool::default();
-    let hold = |i| {
+    let hold = |i: usize| {
         let item = pool.take(|| i);
         pool.keep(item.clone());
         item
