@@ -360,7 +360,7 @@ fn answers_are_the_same_from_every_thread_and_pool() {
         }
     });
     for threads in [1, 3] {
-        let pool = kinora::rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         assert_eq!(pool.install(ask), due);
     }
 }

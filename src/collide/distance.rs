@@ -70,8 +70,8 @@ impl Snapshot {
     pub fn distance_between(&self, a: PartId, b: PartId, within: f64) -> Result<Option<PartDistance>, CollideError> {
         check_float_mode()?;
         let (one, other) = (self.frame(a)?, self.frame(b)?);
-        let limit = checked_within(within)?;
-        let mut best = BestPair { one, other, limit, square: limit * limit, found: None };
+        let reach = checked_within(within)?;
+        let mut best = BestPair { one, other, reach, square: reach * reach, found: None };
         self.tree_of(one).near_pairs(self.tree_of(other), &mut best);
         Ok(best.found.map(|(distance, [x, y], points)| PartDistance {
             distance,
@@ -101,7 +101,7 @@ struct Best {
     point: Vec3,
     wide: DVec3,
     /// Nothing further away counts.
-    limit: f64,
+    reach: f64,
     square: f64,
     found: Option<(f64, PartId, u32, DVec3)>,
 }
@@ -112,8 +112,8 @@ impl Best {
         if !point.is_finite() {
             return Err(CollideError::NotFinite { what: "point" });
         }
-        let limit = checked_within(within)?;
-        Ok(Self { point, wide: point.as_dvec3(), limit, square: limit * limit, found: None })
+        let reach = checked_within(within)?;
+        Ok(Self { point, wide: point.as_dvec3(), reach, square: reach * reach, found: None })
     }
 
     #[inline(always)]
@@ -123,11 +123,11 @@ impl Best {
             Some((distance, p, t, _)) => {
                 near.distance < distance || (near.distance <= distance && (part, triangle) < (p, t))
             }
-            None => near.distance <= self.limit,
+            None => near.distance <= self.reach,
         };
         if better {
             self.found = Some((near.distance, part, triangle, near.points[1]));
-            self.limit = near.distance;
+            self.reach = near.distance;
             // The product may round down.
             self.square = near.distance * near.distance * (1.0 + 4.0 * f64::EPSILON);
         }
@@ -200,7 +200,7 @@ impl Task for NearParts<'_> {
 struct BestPair<'a> {
     one: &'a PartFrame,
     other: &'a PartFrame,
-    limit: f64,
+    reach: f64,
     square: f64,
     found: Option<(f64, [u32; 2], [DVec3; 2])>,
 }
@@ -219,7 +219,7 @@ impl NearPairs for BestPair<'_> {
         let Some(near) = triangle_distance(&self.one.corners(a), &self.other.corners(b)) else { return };
         let better = match known {
             Some((distance, pair)) => near.distance < distance || (near.distance <= distance && [a, b] < pair),
-            None => near.distance <= self.limit,
+            None => near.distance <= self.reach,
         };
         if better {
             self.found = Some((near.distance, [a, b], near.points));

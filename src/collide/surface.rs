@@ -1,6 +1,6 @@
 //! What lies at a point of a triangle.
 
-use glam::{DVec3, Vec2, Vec3};
+use glam::{DVec2, DVec3, Vec2, Vec3};
 
 use super::{CollideError, ObjectId, PartId, Snapshot, world::PartFrame};
 use crate::{
@@ -101,7 +101,7 @@ impl Snapshot {
         let mesh_part = scene.part(frame.instance);
         let uv = mesh_part.tex_coords.first().and_then(|set| {
             let sum = (0..3).map(|i| set.get(corners[i] as usize).map(|uv| uv.as_dvec2() * barycentric[i]));
-            sum.sum::<Option<glam::DVec2>>().map(|uv| uv.as_vec2())
+            sum.sum::<Option<DVec2>>().map(DVec2::as_vec2)
         });
         let mut n_geom = normal(&frame.corners(triangle));
         if !own && is_mirrored(scene, pose, frame.instance, corners[0]) {

@@ -193,7 +193,9 @@ impl BroadPhase {
                 }
                 ControlFlow::Continue(())
             });
-            loose.iter().for_each(|&other| offer(other));
+            for &other in loose {
+                offer(other);
+            }
         }
         found.sort_unstable();
         merge(&mut self.candidates, &found);

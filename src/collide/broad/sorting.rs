@@ -1,7 +1,5 @@
 //! Pairs in ascending order.
 
-#![expect(clippy::cast_possible_truncation, reason = "pairs are counted in 32 bits")]
-
 /// Sorts pairs of numbers below `count`: by counting the first. Takes memory to work in.
 pub(super) fn sort_pairs(pairs: &mut Vec<[u32; 2]>, count: usize, places: &mut Vec<u32>, sorted: &mut Vec<[u32; 2]>) {
     if pairs.len() < 64 || pairs.len() < count / 8 || u32::try_from(pairs.len()).is_err() {

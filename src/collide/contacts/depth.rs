@@ -18,7 +18,7 @@ pub(super) fn shortest_way_out(a: &[Vec3; 3], b: &[Vec3; 3]) -> (DVec3, f64) {
     let mut best: Option<(DVec3, f64)> = None;
     let mut look = |direction: DVec3, size: f64| {
         // Nearly parallel edges give no direction that f64 knows; others bound the way as well.
-        if !(direction.length_squared() > size * NEGLIGIBLE) {
+        if direction.length_squared() <= size * NEGLIGIBLE {
             return;
         }
         let Some(n) = unit(direction) else { return };

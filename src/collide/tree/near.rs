@@ -39,8 +39,7 @@ impl Tree {
             let most = limit(near);
             let mut order = [(0.0_f32, 0_u32); WIDTH];
             let mut found = 0;
-            for lane in 0..node.count as usize {
-                let square = squares[lane];
+            for (&square, &link) in squares.iter().zip(&node.links).take(node.count as usize) {
                 if square <= most {
                     // Furthest first.
                     let mut at = found;
@@ -48,7 +47,7 @@ impl Tree {
                         order[at] = order[at - 1];
                         at -= 1;
                     }
-                    order[at] = (square, node.links[lane]);
+                    order[at] = (square, link);
                     found += 1;
                 }
             }

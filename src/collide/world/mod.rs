@@ -312,8 +312,9 @@ impl CollisionWorld {
         for object in &mut self.objects {
             object.change = Change::None;
         }
+        debug_assert!(self.parts.iter().all(|p| p.frame.is_some()), "every part was updated");
         let frame = Frame {
-            parts: self.parts.iter().map(|p| p.frame.clone().expect("every part was updated")).collect(),
+            parts: self.parts.iter().filter_map(|p| p.frame.clone()).collect(),
             objects: self
                 .objects
                 .iter()

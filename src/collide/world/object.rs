@@ -43,7 +43,7 @@ pub(super) struct Object {
     pub(super) removed: bool,
     pub(super) change: Change,
     source: Source,
-    world_from_object: DAffine3,
+    place: DAffine3,
     /// Must be evaluated before the next snapshot.
     stale: bool,
     poses: Pool<Pose>,
@@ -59,7 +59,7 @@ impl Object {
             removed: false,
             change: Change::Placed,
             source: Source::Clips(Vec::new()),
-            world_from_object: world_from_scene,
+            place: world_from_scene,
             stale: true,
             poses: Pool::default(),
         }
@@ -126,8 +126,8 @@ impl Object {
     pub(super) fn set_transform(&mut self, world_from_object: DAffine3) -> Result<(), CollideError> {
         finite(&world_from_object)?;
         let bits = |m: &DAffine3| m.to_cols_array().map(f64::to_bits);
-        if bits(&self.world_from_object) != bits(&world_from_object) {
-            self.world_from_object = world_from_object;
+        if bits(&self.place) != bits(&world_from_object) {
+            self.place = world_from_object;
             self.stale = !matches!(self.source, Source::Given);
             if self.stale {
                 self.change = Change::Placed;
@@ -158,7 +158,7 @@ impl Object {
         let mut next = self.poses.take(|| Pose::clone(&self.pose));
         let pose = Arc::get_mut(&mut next).expect("a taken buffer has one owner");
         let clips = if let Source::Clips(clips) = &self.source { &clips[..] } else { &[] };
-        pose.evaluate(&self.scene, clips, &self.world_from_object);
+        pose.evaluate(&self.scene, clips, &self.place);
         self.poses.keep(next.clone());
         self.pose = next;
     }
@@ -166,7 +166,7 @@ impl Object {
     /// Vertices that were set, and where they are placed; `None` where they follow from the pose.
     pub(super) fn own_vertices(&self) -> Option<(&[Vec3], &DAffine3)> {
         match &self.source {
-            Source::Vertices(vertices) => Some((vertices, &self.world_from_object)),
+            Source::Vertices(vertices) => Some((vertices, &self.place)),
             _ => None,
         }
     }
