@@ -118,7 +118,14 @@ impl Best {
 
     #[inline(always)]
     fn offer(&mut self, corners: &[Vec3; 3], part: PartId, triangle: u32) {
-        let near = to_triangle(self.wide, &corners.map(Vec3::as_dvec3));
+        let [a, b, c] = corners;
+        let corners = [a.as_dvec3(), b.as_dvec3(), c.as_dvec3()];
+        if let Some((.., nearest)) = self.found
+            && lies_beyond(self.wide, nearest, &corners)
+        {
+            return;
+        }
+        let near = to_triangle(self.wide, &corners);
         let better = match self.found {
             Some((distance, p, t, _)) => {
                 near.distance < distance || (near.distance <= distance && (part, triangle) < (p, t))
@@ -132,6 +139,17 @@ impl Best {
             self.square = near.distance * near.distance * (1.0 + 4.0 * f64::EPSILON);
         }
     }
+}
+
+/// Whether a triangle surely lies further from `p` than the point `nearest`: beyond the plane through it across the way there.
+#[inline(always)]
+fn lies_beyond(p: DVec3, nearest: DVec3, &[a, b, c]: &[DVec3; 3]) -> bool {
+    let way = nearest - p;
+    let square = way.length_squared();
+    let [a, b, c] = [(a - p).dot(way), (b - p).dot(way), (c - p).dot(way)];
+    let least = if a < b { a } else { b };
+    // The margin is far above the roundings of points of the same size as the way; nearer ones are not told apart.
+    (if least < c { least } else { c }) > square * (1.0 + 1e-9) + 1e-13 * p.abs().max_element() * way.abs().max_element()
 }
 
 struct NearTriangles<'a> {

@@ -222,7 +222,7 @@ impl<'a> Sweep<'a> {
     fn tree(&self, from: &Snapshot) -> Tree {
         let triangles = self.after.shape.triangles();
         let mut tree = Tree::clone(from.tree_of(self.before));
-        tree.refit(|i| self.around(&triangles[i as usize]));
+        tree.refit(&|i: u32| self.around(&triangles[i as usize]));
         tree
     }
 

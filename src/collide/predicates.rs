@@ -20,8 +20,11 @@ pub(super) fn sign(value: f64) -> Sign {
 }
 
 /// The sign of `(a - d) . ((b - d) x (c - d))`: on which side of the plane through a, b, c the point d lies. 0 on it, and for a, b, c on one line.
+#[inline]
 pub(super) fn side(a: Vec3, b: Vec3, c: Vec3, d: Vec3) -> Sign {
-    let [p, q, r] = [a, b, c].map(|x| x.as_dvec3() - d.as_dvec3());
+    // Written out: `map` over an array often stays a call.
+    let d64 = d.as_dvec3();
+    let (p, q, r) = (a.as_dvec3() - d64, b.as_dvec3() - d64, c.as_dvec3() - d64);
     let volume = p.dot(q.cross(r));
     // The bound of `Plane::height` with the roles of the points turned round.
     if volume.abs() > BOUND * p.abs().max_element() * norm1(q) * norm1(r) {
@@ -61,8 +64,8 @@ pub(super) struct Plane {
 
 impl Plane {
     pub(super) fn new(corners: [Vec3; 3]) -> Self {
-        let [a, b, c] = corners.map(Vec3::as_dvec3);
-        let (e1, e2) = (b - a, c - a);
+        let a = corners[0].as_dvec3();
+        let (e1, e2) = (corners[1].as_dvec3() - a, corners[2].as_dvec3() - a);
         Self { corners, normal: e2.cross(e1), reach: BOUND * norm1(e1) * norm1(e2) }
     }
 
@@ -80,6 +83,7 @@ impl Plane {
     }
 
     /// As [`side`] of the corners and `d`.
+    #[inline]
     pub(super) fn side(&self, d: Vec3) -> Sign {
         let (height, error) = self.height(d);
         if height.abs() > error {

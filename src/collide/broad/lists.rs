@@ -72,7 +72,7 @@ impl Lists {
         if fresh {
             self.tree.rebuild(volumes.len(), |i| volumes[i as usize]);
         } else {
-            self.tree.refit(|i| volumes[i as usize]);
+            self.tree.refit(&|i: u32| volumes[i as usize]);
         }
     }
 

@@ -13,6 +13,8 @@ mod tests;
 
 use std::{ops::ControlFlow, time::Instant};
 
+use glam::Vec4;
+
 use super::{boxes_meet, tree::Tree};
 use crate::{geom::Aabb, simd::Scalar};
 use choice::Choice;
@@ -69,6 +71,10 @@ pub struct BroadPhase {
     strays: Vec<u32>,
     scratch: Vec<u32>,
     spare: Vec<[u32; 2]>,
+    /// Ends of the boxes, for wide comparisons.
+    wide: Vec<[Vec4; 2]>,
+    keys: Vec<u64>,
+    other_keys: Vec<u64>,
     choice: Choice,
     last: BroadMethod,
     counts: [u64; 4],
@@ -122,7 +128,7 @@ impl BroadPhase {
             self.lists.clear();
             self.choice.forget();
             self.fatten(boxes, 0.0);
-            self.collect(BroadMethod::Rebuild, boxes);
+            self.collect(BroadMethod::Rebuild, boxes, false);
             return BroadMethod::Rebuild;
         }
         if self.stays(boxes) {
@@ -135,7 +141,8 @@ impl BroadPhase {
         let method = self.choice.next(motion);
         self.fatten(boxes, margin);
         let began = Instant::now();
-        self.collect(method, boxes);
+        // Where boxes stay for a while, a better tree pays.
+        self.collect(method, boxes, margin <= 0.0);
         self.choice.note(method, motion, began.elapsed());
         method
     }
@@ -212,7 +219,7 @@ impl BroadPhase {
     }
 
     /// Finds the pairs of `fat` and of those the pairs of `boxes`.
-    fn collect(&mut self, method: BroadMethod, boxes: &[Aabb]) {
+    fn collect(&mut self, method: BroadMethod, boxes: &[Aabb], wild: bool) {
         let fat = &self.fat;
         let candidates = &mut self.candidates;
         candidates.clear();
@@ -221,8 +228,9 @@ impl BroadPhase {
             ControlFlow::Continue(())
         };
         match method {
+            BroadMethod::Rebuild if wild => self.tree.rebuild_by_curve(fat, &mut self.keys, &mut self.other_keys),
             BroadMethod::Rebuild => self.tree.rebuild(fat.len(), |i| fat[i as usize]),
-            _ => self.tree.refit(|i| fat[i as usize]),
+            _ => self.tree.refit(&|i: u32| fat[i as usize]),
         }
         if method == BroadMethod::Resort {
             self.lists.update(&self.tree, fat);
@@ -234,17 +242,24 @@ impl BroadPhase {
         self.test_candidates(boxes);
     }
 
+    /// Of the candidates, whose boxes all have an inside.
     fn test_candidates(&mut self, boxes: &[Aabb]) {
-        let meet = |[a, b]: &&[u32; 2]| boxes_meet(&boxes[*a as usize], &boxes[*b as usize]);
+        self.wide.clear();
+        self.wide.extend(boxes.iter().map(|aabb| [aabb.min.extend(0.0), aabb.max.extend(0.0)]));
+        let wide = &self.wide;
+        let meet = |pair: &&[u32; 2]| {
+            let ([low_a, high_a], [low_b, high_b]) = (&wide[pair[0] as usize], &wide[pair[1] as usize]);
+            (low_a.cmple(*high_b) & low_b.cmple(*high_a)).all()
+        };
         self.pairs.clear();
         self.pairs.extend(self.candidates.iter().filter(meet));
     }
 }
 
-/// Whether a box lies within another; an empty one lies in any.
+/// Whether a box lies within another; an empty one in an empty one only.
 fn within(fat: &Aabb, aabb: &Aabb) -> bool {
-    let inside = fat.min.cmple(aabb.min) & aabb.max.cmple(fat.max);
-    inside.all() || aabb.is_empty()
+    let inside = fat.min.cmple(aabb.min) & aabb.max.cmple(fat.max) & aabb.min.cmple(aabb.max);
+    inside.all() || (aabb.is_empty() && fat.is_empty())
 }
 
 /// A box made larger on all sides, by no less than `by` but for the least step of f32.

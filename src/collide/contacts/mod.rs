@@ -160,14 +160,17 @@ impl Snapshot {
 
     fn within(&self, part: PartId, neighbours: bool) -> Vec<TrianglePair> {
         let frame = &*self.frames()[part.index()];
-        let welded = if neighbours { &[] } else { frame.shape.welded() };
         let mut candidates = Vec::new();
-        self.tree_of(frame).own_pairs(&mut |x: u32, y: u32| {
-            if neighbours || !share_corner(&welded[x as usize], &welded[y as usize]) {
-                candidates.push([x.min(y), x.max(y)]);
-            }
+        let mut push = |x: u32, y: u32| {
+            candidates.push([x.min(y), x.max(y)]);
             ControlFlow::Continue(())
-        });
+        };
+        let tree = self.tree_of(frame);
+        if neighbours {
+            tree.own_pairs(&mut push);
+        } else {
+            tree.own_pairs_apart(frame.shape.welded(), &mut push);
+        }
         meeting(frame, frame, candidates, [part; 2])
     }
 
@@ -191,11 +194,8 @@ fn meeting(one: &PartFrame, other: &PartFrame, mut candidates: Vec<[u32; 2]>, pa
 }
 
 /// Whether two triangles have a corner's number in common.
-#[inline(always)]
 pub(super) fn share_corner(a: &[u32; 3], b: &[u32; 3]) -> bool {
-    // No branches: most pairs of neighbouring triangles are told apart by chance.
-    let differ = |x: u32| (x ^ b[0]).min(x ^ b[1]).min(x ^ b[2]);
-    differ(a[0]).min(differ(a[1])).min(differ(a[2])) == 0
+    a.iter().any(|corner| b.contains(corner))
 }
 
 /// How two triangles meet.

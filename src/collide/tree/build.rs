@@ -10,7 +10,7 @@
     reason = "items are counted in 31 bits; places of bins saturate and are clamped"
 )]
 
-use std::ops::Range;
+use std::{ops::Range, sync::OnceLock};
 
 use glam::Vec3;
 
@@ -63,6 +63,7 @@ impl Tree {
         assert!(count <= MAX_ITEMS, "{count} boxes");
         self.nodes.clear();
         self.bounds.clear();
+        self.labels = OnceLock::new();
         self.build = BUILDS.fetch_add(1, Ordering::Relaxed);
         let mut items: Vec<Item> = (0..count as u32).map(|id| Item { aabb: cleaned(boxes(id)), id }).collect();
         if count > 0 {

@@ -8,6 +8,7 @@
 
 mod along;
 mod build;
+mod curve;
 mod near;
 mod pairs;
 #[cfg(test)]
@@ -16,19 +17,23 @@ mod touch;
 
 use std::{
     ops::ControlFlow,
-    sync::atomic::{AtomicU64, Ordering},
+    sync::{
+        OnceLock,
+        atomic::{AtomicU64, Ordering},
+    },
 };
 
 use glam::Vec3;
 
 use crate::{
-    geom::Aabb,
-    simd::{Lanes, Simd},
+    geom::{Aabb, PrimId, Triangles},
+    simd::{Lanes, Simd, SimdLevel, Task, dispatch},
 };
 
 pub(super) use along::Along;
 pub(super) use near::Near;
 pub(super) use pairs::PairVisitor;
+use pairs::Labels;
 pub(super) use touch::NearPairs;
 
 /// Boxes a node.
@@ -43,7 +48,7 @@ const LEAF: u32 = 1 << 31;
 /// Eight boxes by component, and what each stands for.
 #[derive(Clone, Debug)]
 #[repr(C, align(64))]
-struct Node {
+pub(super) struct Node {
     min: [[f32; WIDTH]; 3],
     max: [[f32; WIDTH]; 3],
     /// Items of a leaf, [`NONE`] where there is none; else numbers of child nodes, with [`LEAF`] for leaves.
@@ -84,6 +89,17 @@ impl Node {
         mask
     }
 
+    /// Sum of half the boxes' areas.
+    #[inline(always)]
+    fn area<S: Simd>(&self) -> f64 {
+        let none = S::F8::splat(0.0);
+        let extent = |axis: usize| (S::F8::load(&self.max[axis]) - S::F8::load(&self.min[axis])).max(none);
+        let (x, y, z) = (extent(0), extent(1), extent(2));
+        let mut areas = [0.0; WIDTH];
+        (x * (y + z) + y * z).store(&mut areas);
+        areas.iter().take(self.count as usize).map(|&area| f64::from(area)).sum()
+    }
+
     /// The least box around all.
     #[inline(always)]
     fn bounds(&self) -> Aabb {
@@ -113,6 +129,8 @@ pub(super) struct Tree {
     bounds: Vec<Aabb>,
     /// Differs between any two builds.
     build: u64,
+    /// Labels of each leaf's items, in the order of the nodes; see [`Tree::own_pairs_apart`].
+    labels: OnceLock<Vec<Labels>>,
     /// Sum of the nodes' areas after the build, over that of the items.
     fresh: f64,
     /// The same now.
@@ -143,28 +161,12 @@ impl Tree {
     }
 
     /// Takes the items' new boxes, as many as before. No allocation.
-    pub(super) fn refit(&mut self, boxes: impl Fn(u32) -> Aabb) {
-        let (mut areas, mut own) = (0.0_f64, 0.0_f64);
-        for number in (0..self.nodes.len()).rev() {
-            let (before, after) = self.bounds.split_at_mut(number + 1);
-            let node = &mut self.nodes[number];
-            for lane in 0..node.count as usize {
-                let link = node.links[lane];
-                let aabb =
-                    if node.is_leaf { cleaned(boxes(link)) } else { after[(link & !LEAF) as usize - number - 1] };
-                node.put(lane, &aabb);
-                if node.is_leaf {
-                    own += f64::from(aabb.half_area());
-                }
-            }
-            before[number] = node.bounds();
-            areas += f64::from(before[number].half_area());
-        }
-        self.now = if own > 0.0 { areas / own } else { 0.0 };
+    pub(super) fn refit<B: Boxes>(&mut self, boxes: &B) {
+        dispatch(SimdLevel::best(), Refit { tree: self, boxes });
     }
 
     /// Takes the items' boxes into the shape of another tree over as many. No allocation when this one came of it.
-    pub(super) fn refit_from(&mut self, shape: &Self, boxes: impl Fn(u32) -> Aabb) {
+    pub(super) fn refit_from<B: Boxes>(&mut self, shape: &Self, boxes: &B) {
         if self.build != shape.build {
             self.clone_from(shape);
         }
@@ -193,6 +195,85 @@ impl Tree {
             }
         }
         ControlFlow::Continue(())
+    }
+}
+
+struct Refit<'a, B> {
+    tree: &'a mut Tree,
+    boxes: &'a B,
+}
+
+impl<B: Boxes> Task for Refit<'_, B> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self) {
+        let Self { tree, boxes } = self;
+        let (mut areas, mut own) = (0.0_f64, 0.0_f64);
+        for number in (0..tree.nodes.len()).rev() {
+            let (before, after) = tree.bounds.split_at_mut(number + 1);
+            let node = &mut tree.nodes[number];
+            if node.is_leaf {
+                boxes.fill::<S>(node);
+                own += node.area::<S>();
+            } else {
+                for lane in 0..node.count as usize {
+                    let aabb = after[(node.links[lane] & !LEAF) as usize - number - 1];
+                    node.put(lane, &aabb);
+                }
+            }
+            before[number] = node.bounds();
+            areas += f64::from(before[number].half_area());
+        }
+        tree.now = if own > 0.0 { areas / own } else { 0.0 };
+    }
+}
+
+/// Boxes by number.
+pub(super) trait Boxes {
+    /// A box; NaN and boxes without an inside count as empty.
+    fn get(&self, number: u32) -> Aabb;
+
+    /// Takes the boxes of a leaf.
+    #[inline(always)]
+    fn fill<S: Simd>(&self, leaf: &mut Node) {
+        for lane in 0..leaf.count as usize {
+            leaf.put(lane, &cleaned(self.get(leaf.links[lane])));
+        }
+    }
+}
+
+impl<F: Fn(u32) -> Aabb> Boxes for F {
+    #[inline(always)]
+    fn get(&self, number: u32) -> Aabb {
+        self(number)
+    }
+}
+
+impl Boxes for Triangles<'_> {
+    #[inline(always)]
+    fn get(&self, number: u32) -> Aabb {
+        self.aabb(PrimId(number))
+    }
+
+    /// The corners are finite.
+    #[inline(always)]
+    fn fill<S: Simd>(&self, leaf: &mut Node) {
+        let mut corners = [[[0.0_f32; WIDTH]; 3]; 3];
+        for lane in 0..WIDTH {
+            // Places that are not in use repeat the last one.
+            let link = leaf.links[lane.min(leaf.count as usize - 1)];
+            let triangle = self.indices[link as usize];
+            for (corner, rows) in triangle.iter().zip(&mut corners) {
+                let p = self.positions[*corner as usize];
+                (rows[0][lane], rows[1][lane], rows[2][lane]) = (p.x, p.y, p.z);
+            }
+        }
+        for axis in 0..3 {
+            let [a, b, c] = [0, 1, 2].map(|corner: usize| S::F8::load(&corners[corner][axis]));
+            a.min(b).min(c).store(&mut leaf.min[axis]);
+            a.max(b).max(c).store(&mut leaf.max[axis]);
+        }
     }
 }
 

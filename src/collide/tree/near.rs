@@ -35,21 +35,21 @@ impl Tree {
                 continue;
             }
             let node = &self.nodes[(link & !LEAF) as usize];
-            let squares = node.squares::<S>(point);
-            let most = limit(near);
+            let mut squares = [0.0; WIDTH];
+            let mut mask = node.squares::<S>(point, limit(near), &mut squares);
             let mut order = [(0.0_f32, 0_u32); WIDTH];
             let mut found = 0;
-            for (&square, &link) in squares.iter().zip(&node.links).take(node.count as usize) {
-                if square <= most {
-                    // Furthest first.
-                    let mut at = found;
-                    while at > 0 && order[at - 1].0 < square {
-                        order[at] = order[at - 1];
-                        at -= 1;
-                    }
-                    order[at] = (square, link);
-                    found += 1;
+            while mask != 0 {
+                let lane = mask.trailing_zeros() as usize & (WIDTH - 1);
+                mask &= mask - 1;
+                // Furthest first.
+                let mut at = found;
+                while at > 0 && order[at - 1].0 < squares[lane] {
+                    order[at] = order[at - 1];
+                    at -= 1;
                 }
+                order[at] = (squares[lane], node.links[lane]);
+                found += 1;
             }
             if node.is_leaf {
                 for &(square, item) in order[..found].iter().rev() {
@@ -72,9 +72,9 @@ fn limit<N: Near>(near: &N) -> f32 {
 }
 
 impl super::Node {
-    /// Squared distances of a point to the boxes, not above the true ones but for underflow; infinite for empty boxes.
+    /// Squared distances of a point to the boxes, not above the true ones but for underflow; infinite for empty boxes. Places within a limit.
     #[inline(always)]
-    fn squares<S: Simd>(&self, point: Vec3) -> [f32; WIDTH] {
+    fn squares<S: Simd>(&self, point: Vec3, most: f32, out: &mut [f32; WIDTH]) -> u32 {
         let mut sum = S::F8::splat(0.0);
         for axis in 0..3 {
             let p = S::F8::splat(point[axis]);
@@ -82,9 +82,9 @@ impl super::Node {
             let d = outside.max(S::F8::splat(0.0));
             sum = sum + d * d;
         }
-        let mut out = [0.0; WIDTH];
-        (sum * S::F8::splat(BELOW)).store(&mut out);
-        out
+        let squares = sum * S::F8::splat(BELOW);
+        squares.store(out);
+        squares.le(S::F8::splat(most)) & ((1 << self.count) - 1)
     }
 }
 

@@ -2,8 +2,8 @@
 
 use std::ops::ControlFlow;
 
-use super::{LEAF, Node, Tree};
-use crate::simd::{Simd, SimdLevel, Task, dispatch};
+use super::{LEAF, Node, Tree, WIDTH};
+use crate::simd::{Lanes, Simd, SimdLevel, Task, dispatch};
 
 /// Takes pairs of items whose closed boxes meet.
 pub(in crate::collide) trait PairVisitor {
@@ -32,7 +32,17 @@ impl Tree {
     /// Every unordered pair of different items of this tree whose closed boxes meet, in no particular order.
     pub(in crate::collide) fn own_pairs<V: PairVisitor>(&self, visitor: &mut V) {
         if !self.nodes.is_empty() {
-            dispatch(SimdLevel::best(), Within { tree: self, visitor });
+            dispatch(SimdLevel::best(), Within { tree: self, visitor, labels: None });
+        }
+    }
+
+    /// As [`Tree::own_pairs`], without pairs of items that have a label in common.
+    ///
+    /// `labels` gives three below 2^28 for each item, the same at every call between two builds.
+    pub(in crate::collide) fn own_pairs_apart<V: PairVisitor>(&self, labels: &[[u32; 3]], visitor: &mut V) {
+        if !self.nodes.is_empty() {
+            let of_nodes = self.labels.get_or_init(|| self.nodes.iter().map(|node| Labels::new(node, labels)).collect());
+            dispatch(SimdLevel::best(), Within { tree: self, visitor, labels: Some(of_nodes) });
         }
     }
 
@@ -44,6 +54,41 @@ impl Tree {
     #[inline(always)]
     fn node(&self, link: u32) -> &Node {
         &self.nodes[(link & !LEAF) as usize]
+    }
+}
+
+/// Three labels of each item of a leaf, as floats: comparisons of those are at hand, and numbers of one size and sign differ as their bits do.
+#[derive(Clone, Debug)]
+pub(super) struct Labels([[f32; WIDTH]; 3]);
+
+/// Added to labels, so that they are the bits of normal floats.
+const NORMAL: u32 = 1 << 29;
+
+impl Labels {
+    fn new(node: &Node, labels: &[[u32; 3]]) -> Self {
+        let mut out = Self([[0.0; WIDTH]; 3]);
+        if node.is_leaf {
+            for (lane, &item) in node.links.iter().enumerate().take(node.count as usize) {
+                for (row, label) in out.0.iter_mut().zip(labels[item as usize]) {
+                    row[lane] = f32::from_bits(NORMAL + label);
+                }
+            }
+        }
+        out
+    }
+
+    /// Places whose items have a label in common with that at a place of another leaf.
+    #[inline(always)]
+    fn shared<S: Simd>(&self, other: &Self, row: usize) -> u32 {
+        let mut mask = 0;
+        for own in &self.0 {
+            let own = S::F8::load(own);
+            for labels in &other.0 {
+                let label = S::F8::splat(labels[row]);
+                mask |= own.le(label) & label.le(own);
+            }
+        }
+        mask
     }
 }
 
@@ -61,13 +106,19 @@ impl<V: PairVisitor> Task for Between<'_, V> {
         let mut stack = Vec::with_capacity(256);
         stack.push((self.a.root(), self.b.root()));
         // A visitor that breaks has what it wanted.
-        let _ = walk::<S, V>(self.a, self.b, &mut stack, self.visitor);
+        let _ = walk::<S, V>(self.a, self.b, &mut stack, None, self.visitor);
     }
 }
 
 /// Works off pairs of nodes, of `a` and of `b`, whose boxes meet.
 #[inline(always)]
-fn walk<S: Simd, V: PairVisitor>(a: &Tree, b: &Tree, stack: &mut Vec<(u32, u32)>, visitor: &mut V) -> ControlFlow<()> {
+fn walk<S: Simd, V: PairVisitor>(
+    a: &Tree,
+    b: &Tree,
+    stack: &mut Vec<(u32, u32)>,
+    labels: Option<&[Labels]>,
+    visitor: &mut V,
+) -> ControlFlow<()> {
     while let Some((of_a, of_b)) = stack.pop() {
         let (one, other) = (a.node(of_a), b.node(of_b));
         // A leaf waits until the other is one too.
@@ -88,6 +139,9 @@ fn walk<S: Simd, V: PairVisitor>(a: &Tree, b: &Tree, stack: &mut Vec<(u32, u32)>
                 continue;
             }
             let mut mask = other.meets::<S>(&one.get(row));
+            if let (Some(labels), true, true) = (labels, one.is_leaf, mask != 0) {
+                mask &= !labels[(of_b & !LEAF) as usize].shared::<S>(&labels[(of_a & !LEAF) as usize], row);
+            }
             while mask != 0 {
                 let pair = (one.links[row], other.links[mask.trailing_zeros() as usize & 7]);
                 mask &= mask - 1;
@@ -101,6 +155,7 @@ fn walk<S: Simd, V: PairVisitor>(a: &Tree, b: &Tree, stack: &mut Vec<(u32, u32)>
 struct Within<'a, V> {
     tree: &'a Tree,
     visitor: &'a mut V,
+    labels: Option<&'a [Labels]>,
 }
 
 impl<V: PairVisitor> Task for Within<'_, V> {
@@ -114,6 +169,9 @@ impl<V: PairVisitor> Task for Within<'_, V> {
             for row in 0..node.count as usize {
                 // Later places only: each pair once.
                 let mut mask = node.meets::<S>(&node.get(row)) & (u32::MAX << row << 1);
+                if let (Some(labels), true, true) = (self.labels, node.is_leaf, mask != 0) {
+                    mask &= !labels[number].shared::<S>(&labels[number], row);
+                }
                 while mask != 0 {
                     let pair = (node.links[row], node.links[mask.trailing_zeros() as usize & 7]);
                     mask &= mask - 1;
@@ -124,7 +182,7 @@ impl<V: PairVisitor> Task for Within<'_, V> {
                     }
                 }
             }
-            if walk::<S, V>(self.tree, self.tree, &mut stack, self.visitor).is_break() {
+            if walk::<S, V>(self.tree, self.tree, &mut stack, self.labels, self.visitor).is_break() {
                 return;
             }
         }

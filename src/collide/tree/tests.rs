@@ -55,7 +55,7 @@ proptest! {
         let other = Tree::build(b.len(), |i| b[i as usize]);
         check(&tree, &a, &other, &b)?;
         let a: Vec<_> = a.iter().zip(moved.iter().chain(std::iter::repeat(&Aabb::EMPTY))).map(|(_, m)| *m).collect();
-        tree.refit(|i| a[i as usize]);
+        tree.refit(&|i: u32| a[i as usize]);
         check(&tree, &a, &other, &b)?;
     }
 
@@ -94,8 +94,8 @@ fn leaves_are_nearly_full_and_fresh_trees_have_not_decayed() {
     let leaves = tree.nodes.iter().filter(|n| n.is_leaf).count();
     assert!(leaves <= 4000 / 8 * 11 / 10, "{leaves} leaves");
     let mut again = tree.clone();
-    again.refit(|i| boxes[i as usize]);
+    again.refit(&|i: u32| boxes[i as usize]);
     assert!((again.decay() - 1.0).abs() < 1e-9, "{}", again.decay());
-    again.refit(|i| boxes[(i as usize * 31) % boxes.len()]);
+    again.refit(&|i: u32| boxes[(i as usize * 31) % boxes.len()]);
     assert!(again.decay() > 3.0, "{}", again.decay());
 }

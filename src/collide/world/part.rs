@@ -62,7 +62,7 @@ impl PartFrame {
             Arc::new(match &self.old_tree {
                 Some(old) => {
                     let mut tree = Tree::clone(old);
-                    tree.refit(|i| triangles.aabb(PrimId(i)));
+                    tree.refit(&triangles);
                     tree
                 }
                 None => Tree::build(triangles.len(), |i| triangles.aabb(PrimId(i))),
@@ -253,7 +253,7 @@ impl Part {
         let out = Arc::get_mut(&mut next).expect("a taken buffer has one owner");
         match kept {
             // Buffers in the pool may be of an earlier build.
-            Some(tree) => out.refit_from(tree, |i| triangles.aabb(PrimId(i))),
+            Some(tree) => out.refit_from(tree, &triangles),
             None => out.rebuild(triangles.len(), |i| triangles.aabb(PrimId(i))),
         }
         if let Some(old) = old {

@@ -132,6 +132,8 @@ impl PartShape {
     /// Corners of a triangle.
     #[inline(always)]
     pub(in crate::collide) fn corners(&self, positions: &[Vec3], triangle: PrimId) -> [Vec3; 3] {
-        self.layout.indices[triangle.0 as usize].map(|i| positions[i as usize])
+        // Not by `map`, whose closure would stay a call in kernels.
+        let [a, b, c] = self.layout.indices[triangle.0 as usize];
+        [positions[a as usize], positions[b as usize], positions[c as usize]]
     }
 }
