@@ -149,7 +149,8 @@ fn lies_beyond(p: DVec3, nearest: DVec3, &[a, b, c]: &[DVec3; 3]) -> bool {
     let [a, b, c] = [(a - p).dot(way), (b - p).dot(way), (c - p).dot(way)];
     let least = if a < b { a } else { b };
     // The margin is far above the roundings of points of the same size as the way; nearer ones are not told apart.
-    (if least < c { least } else { c }) > square * (1.0 + 1e-9) + 1e-13 * p.abs().max_element() * way.abs().max_element()
+    (if least < c { least } else { c })
+        > square * (1.0 + 1e-9) + 1e-13 * p.abs().max_element() * way.abs().max_element()
 }
 
 struct NearTriangles<'a> {

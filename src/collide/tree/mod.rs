@@ -32,8 +32,8 @@ use crate::{
 
 pub(super) use along::Along;
 pub(super) use near::Near;
-pub(super) use pairs::PairVisitor;
 use pairs::Labels;
+pub(super) use pairs::PairVisitor;
 pub(super) use touch::NearPairs;
 
 /// Boxes a node.

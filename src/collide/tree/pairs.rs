@@ -41,7 +41,8 @@ impl Tree {
     /// `labels` gives three below 2^28 for each item, the same at every call between two builds.
     pub(in crate::collide) fn own_pairs_apart<V: PairVisitor>(&self, labels: &[[u32; 3]], visitor: &mut V) {
         if !self.nodes.is_empty() {
-            let of_nodes = self.labels.get_or_init(|| self.nodes.iter().map(|node| Labels::new(node, labels)).collect());
+            let of_nodes =
+                self.labels.get_or_init(|| self.nodes.iter().map(|node| Labels::new(node, labels)).collect());
             dispatch(SimdLevel::best(), Within { tree: self, visitor, labels: Some(of_nodes) });
         }
     }
