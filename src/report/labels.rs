@@ -8,7 +8,7 @@ const LINE: i32 = 13;
 const MARK: i32 = 6;
 
 /// A rectangle in pixels: left, top, right, bottom.
-type Rect = [i32; 4];
+pub(super) type Rect = [i32; 4];
 
 fn overlap(a: &Rect, b: &Rect) -> bool {
     a[0] < b[2] && b[0] < a[2] && a[1] < b[3] && b[1] < a[3]
@@ -23,18 +23,18 @@ pub(super) struct Label {
     pub(super) from: Option<(i32, i32)>,
 }
 
-/// What is taken in a picture of `size` pixels.
+/// What is taken of an area.
 #[derive(Clone, Debug)]
 pub(super) struct Labels {
-    size: (i32, i32),
+    area: Rect,
     taken: Vec<Rect>,
 }
 
 impl Labels {
-    /// A picture with marks at `points`.
-    pub(super) fn new(size: (i32, i32), points: impl Iterator<Item = (i32, i32)>) -> Self {
+    /// An area with marks at `points`.
+    pub(super) fn new(area: Rect, points: impl Iterator<Item = (i32, i32)>) -> Self {
         let mark = |(x, y): (i32, i32)| [x - MARK, y - MARK, x + MARK, y + MARK];
-        Self { size, taken: points.map(mark).collect() }
+        Self { area, taken: points.map(mark).collect() }
     }
 
     /// The nearest free place for `name` beside a point, and takes it: to the right if it can be, else to the left, further and further up and
@@ -53,7 +53,8 @@ impl Labels {
         let places = heights.flat_map(|rows| beside(rows).map(move |left| (left, y + rows * LINE)));
         let is_free = |&(left, middle): &(i32, i32)| {
             let r = rect(left, middle);
-            let is_inside = r[0] >= 0 && r[1] >= 0 && r[2] <= self.size.0 && r[3] <= self.size.1;
+            let [x0, y0, x1, y1] = self.area;
+            let is_inside = r[0] >= x0 && r[1] >= y0 && r[2] <= x1 && r[3] <= y1;
             is_inside && !self.taken.iter().any(|t| overlap(t, &r))
         };
         let (left, middle) = places.into_iter().find(is_free).unwrap_or((x + MARK + 2, y));
@@ -70,23 +71,23 @@ mod tests {
 
     #[test]
     fn names_cover_no_mark_no_other_name_and_stay_inside() {
-        let size = (600, 400);
-        let points: Vec<(i32, i32)> = (0..12).map(|i| (560 - i * 3, 20 + i * 5)).chain([(3, 3), (300, 396)]).collect();
-        let mut labels = Labels::new(size, points.iter().copied());
+        let area = [40, 0, 600, 400];
+        let points: Vec<(i32, i32)> = (0..12).map(|i| (560 - i * 3, 20 + i * 5)).chain([(43, 3), (300, 396)]).collect();
+        let mut labels = Labels::new(area, points.iter().copied());
         let name = "structure fast triangles, single";
         for &point in &points {
             labels.place(name, point);
         }
         let (marks, names) = labels.taken.split_at(points.len());
         for (i, r) in names.iter().enumerate() {
-            assert!(r[0] >= 0 && r[1] >= 0 && r[2] <= size.0 && r[3] <= size.1, "{r:?}");
+            assert!(r[0] >= area[0] && r[1] >= area[1] && r[2] <= area[2] && r[3] <= area[3], "{r:?}");
             assert!(!marks.iter().chain(&names[..i]).any(|t| overlap(t, r)), "{r:?}");
         }
     }
 
     #[test]
     fn a_lone_point_has_its_name_to_its_right_and_one_at_the_edge_to_its_left() {
-        let mut labels = Labels::new((200, 100), [(20, 50), (190, 50)].into_iter());
+        let mut labels = Labels::new([0, 0, 200, 100], [(20, 50), (190, 50)].into_iter());
         assert_eq!(labels.place("abc", (20, 50)), Label { at: (28, 50), from: None });
         assert_eq!(labels.place("abc", (190, 50)), Label { at: (164, 50), from: None });
     }

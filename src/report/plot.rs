@@ -300,15 +300,14 @@ fn draw_scatter(root: &Area<'_>, title: &str, scatter: &Scatter) -> Result<(), F
         let at = (px - origin.0, py - origin.1);
         draw_mark_in(&plot, dot.mark, if dot.is_best { COLORS[dot.mark % 2] } else { DOMINATED }, at)?;
     }
-    let (width, height) = plot.dim_in_pixel();
     let in_pixels = |at: &(f64, f64)| {
         let (x, y) = chart.backend_coord(at);
         (x - origin.0, y - origin.1)
     };
-    // Above the numbers of the x axis; the strip of the legend is free but for its top.
-    #[expect(clippy::cast_possible_wrap, reason = "a picture's size")]
-    let size = (width as i32, (height - BELOW) as i32);
-    let mut labels = Labels::new(size, points(false).chain(points(true)).map(|(_, at)| in_pixels(&at)));
+    // Between the axes.
+    let (low, high) = (in_pixels(&(x.0, y.0)), in_pixels(&(x.1, y.1)));
+    let area = [low.0 + 2, high.1, high.0, low.1 - 2];
+    let mut labels = Labels::new(area, points(false).chain(points(true)).map(|(_, at)| in_pixels(&at)));
     for (dot, at) in points(true) {
         let label = labels.place(&dot.name, in_pixels(&at));
         if let Some(from) = label.from {

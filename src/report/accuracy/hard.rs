@@ -98,12 +98,12 @@ pub(super) fn in_short() -> String {
 const COLUMNS: &[Column] = &[
     Column::new("trials", "scene", Role::Id, 0),
     Column::new("what", "of", Role::Id, 0),
-    Column::new("missed", "missed [%]", Role::Note, 4),
-    Column::new("missed_most", "at most [%]", Role::Note, 4),
-    Column::new("false_hits", "false [%]", Role::Note, 4),
-    Column::new("false_hits_most", "at most [%]", Role::Note, 4),
-    Column::new("wrong", "wrong triangle [%]", Role::Note, 4),
-    Column::new("wrong_most", "at most [%]", Role::Note, 4),
+    Column::new("missed", "missed [%]", Role::Note, 2),
+    Column::new("missed_most", "at most [%]", Role::Note, 2),
+    Column::new("false_hits", "false [%]", Role::Note, 2),
+    Column::new("false_hits_most", "at most [%]", Role::Note, 2),
+    Column::new("wrong", "wrong triangle [%]", Role::Note, 2),
+    Column::new("wrong_most", "at most [%]", Role::Note, 2),
 ];
 
 /// The list as it is written.

@@ -19,6 +19,7 @@ const COLUMNS: &[Column] = &[
     Column::new("cast", "cast", Role::Id, 0),
     Column::new("kind", "kind", Role::Note, 0),
     Column::new("relative", "time of a ray", Role::Sooner, 2),
+    Column::new("relative_aimed", "at edges", Role::Sooner, 2),
     Column::new("ns_primary", "primary [ns]", Role::Sooner, 0),
     Column::new("ns_shadow", "shadow [ns]", Role::Sooner, 0),
     Column::new("ns_diffuse", "diffuse [ns]", Role::Sooner, 0),
@@ -47,8 +48,8 @@ pub(super) struct PointRow {
     nodes: &'static str,
     forms: Forms,
     cast: &'static str,
-    /// Time over that of exact single rays of `bvh2`, the geometric mean.
-    relative: Option<f64>,
+    /// Time over that of exact single rays of `bvh2`, the geometric mean: of ordinary rays, and of those at edges and corners.
+    relative: [Option<f64>; 2],
     /// Primary, shadow and diffuse rays, the median over scenes.
     ns: [Option<f64>; 3],
     bytes_per_triangle: Option<f64>,
@@ -64,15 +65,18 @@ impl PointRow {
         let first = of[0];
         let ns = [RayClass::Primary, RayClass::Shadow, RayClass::Diffuse]
             .map(|class| median(of.iter().filter(|r| r.class == Class::Common(class)).filter_map(|r| r.ns())));
-        let ratios: Vec<f64> = of.iter().filter_map(|r| over_plain(rows, r)).collect();
-        let mean = ratios.iter().map(|r| libm::log(*r)).sum::<f64>() / ratios.len().max(1) as f64;
+        let relative = [false, true].map(|aimed| {
+            let ratios = of.iter().filter(|r| is_aimed(r.class) == aimed).filter_map(|r| over_plain(rows, r));
+            let logs: Vec<f64> = ratios.map(libm::log).collect();
+            (!logs.is_empty()).then(|| libm::exp(logs.iter().sum::<f64>() / logs.len() as f64))
+        });
         let aimed = || of.iter().filter(|r| is_aimed(r.class)).map(|r| &r.errors);
         Self {
             structure: first.structure.clone(),
             nodes: first.nodes,
             forms: first.forms,
             cast: first.cast(),
-            relative: (!ratios.is_empty()).then(|| libm::exp(mean)),
+            relative,
             ns,
             bytes_per_triangle: median(of.iter().map(|r| r.bytes_per_triangle)),
             errors: of.iter().fold(Errors::default(), |sum, r| sum.and(&r.errors)),
@@ -82,8 +86,7 @@ impl PointRow {
     }
 
     fn name(&self) -> String {
-        let packets = if self.cast == "packets" { ", packets" } else { "" };
-        format!("{} {}{packets}", self.structure, label(self.forms))
+        format!("{} {}", self.structure, label(self.forms))
     }
 
     fn is_exact(&self) -> bool {
@@ -105,8 +108,8 @@ impl PointRow {
             label(self.forms).into(),
             self.cast.into(),
             if self.is_exact() { "conservative" } else { "lossy" }.into(),
-            self.relative.into(),
         ];
+        cells.extend(self.relative.map(Cell::from));
         cells.extend(self.ns.map(Cell::from));
         cells.extend([self.bytes_per_triangle.into(), e.rays.into()]);
         cells.extend([e.false_misses, e.false_hits, e.wrong].into_iter().flat_map(|n| counted(n, e.rays)));
@@ -164,7 +167,7 @@ const TRADES: [Trade; 4] = [
     Trade { name: "bytes and error of t", cost: BYTES, error: OF_T },
 ];
 
-const TIME: Measure = Measure("time of a ray over that of bvh2, exact, single", |p| p.relative.map(|x| [x, x]));
+const TIME: Measure = Measure("time of a ray over that of bvh2, exact, single", |p| p.relative[0].map(|x| [x, x]));
 const BYTES: Measure = Measure("bytes a triangle", |p| p.bytes_per_triangle.map(|x| [x, x]));
 const WRONG: Measure = Measure("wrong answers in 10^9, at most (95 %)", |p| Some(p.share().map(|s| s * 1e9)));
 const OF_T: Measure = Measure("largest error of t [u]", |p| p.errors.t[2].map(|t| [t, t]));
@@ -172,17 +175,18 @@ const OF_T: Measure = Measure("largest error of t [u]", |p| p.errors.t[2].map(|t
 impl Trade {
     /// Points that have both, with cost, error, where the error is drawn, and whether no other point beats it.
     ///
-    /// Points that judged few rays are left out: their counts say little.
-    fn front<'a>(&self, points: &'a [PointRow]) -> Vec<(&'a PointRow, f64, [f64; 2], bool)> {
-        let most = points.iter().map(|p| p.errors.rays).max().unwrap_or(0);
+    /// Points that judged few rays are left out: their counts say little. Packets, which answer ordinary rays only, stand by themselves.
+    fn front<'a>(&self, points: &'a [PointRow], cast: &str) -> Vec<(&'a PointRow, f64, [f64; 2], bool)> {
+        let of_cast = || points.iter().filter(|p| p.cast == cast);
+        let most = of_cast().map(|p| p.errors.rays).max().unwrap_or(0);
         let both = |p: &'a PointRow| Some((p, (self.cost.1)(p)?[0], (self.error.1)(p)?));
-        let found: Vec<_> = points.iter().filter(|p| competes(p.errors.rays, most)).filter_map(both).collect();
+        let found: Vec<_> = of_cast().filter(|p| competes(p.errors.rays, most)).filter_map(both).collect();
         let best = non_dominated(&found.iter().map(|f| (f.1, f.2[0])).collect::<Vec<_>>());
         found.into_iter().zip(best).map(|((p, cost, error), best)| (p, cost, error, best)).collect()
     }
 
     fn plot(&self, points: &[PointRow]) -> Option<Plot> {
-        let dots = self.front(points).into_iter().map(|(p, cost, [_, drawn], is_best)| Dot {
+        let dots = self.front(points, "single").into_iter().map(|(p, cost, [_, drawn], is_best)| Dot {
             name: p.name(),
             at: (cost, drawn),
             is_best,
@@ -192,7 +196,7 @@ impl Trade {
         let chart = Scatter { x: self.cost.0.to_owned(), y: self.error.0.to_owned(), dots };
         let name = format!("points-{}", self.name.replace(' ', "-"));
         (chart.dots.len() > 2)
-            .then(|| Plot::new(name, format!("All scenes and rays: {}", self.name), Chart::Scatter(chart)))
+            .then(|| Plot::new(name, format!("All scenes, single rays: {}", self.name), Chart::Scatter(chart)))
     }
 }
 
@@ -201,17 +205,18 @@ pub(super) fn table(points: &[PointRow]) -> Table {
     let mut table = Table::new("points", "Every structure and form, over all scenes and rays", COLUMNS)
         .with_note(
             "All points answer the same rays, and every answer is judged by `report::reference`. A *conservative* point takes no shortcut that could change an answer; a *lossy* one names the \
-             steps that do. *Time of a ray* is relative to single exact rays of `bvh2`, the geometric mean over scenes and classes of rays (packets: over those that come in packets). \
+             steps that do. *Time of a ray* is relative to single exact rays of `bvh2`, the geometric mean over scenes and classes of ordinary rays (packets: over those that come in packets), and over rays at edges and corners. \
              Nanoseconds are of one thread, the median over scenes. Structures that test every triangle, or nearly, answer fewer rays.",
         )
         .with_note(
             "*Missed*: something is met, nothing was found. *False*: the reverse. *Wrong triangle*: not among those met first (of several met at the same t, each is right). *Leaks*: rays from inside a \
              closed mesh that meet nothing. Behind each count stands the rate that it rules out with 95 % confidence (Wilson's score interval). Errors of t are relative, those of u and v absolute, in u = \
-             2^-24; a correct rounding errs by at most 1 and 0.5. *Worth its cost by*: no other point costs at most as much and errs at most as much, and is better in one of both; points that judged \
-             less than a twentieth of the rays do not compete.",
+             2^-24; a correct rounding errs by at most 1 and 0.5. *Worth its cost by*: no other point costs at most as much and errs at most as much, and is better in one of both; single rays and packets compete \
+             by themselves, and points that judged less than a twentieth of the rays do not.",
         );
     for (i, point) in points.iter().enumerate() {
-        let is_best = |t: &&Trade| t.front(points).iter().any(|f| f.3 && std::ptr::eq(f.0, &raw const points[i]));
+        let is_best =
+            |t: &&Trade| t.front(points, point.cast).iter().any(|f| f.3 && std::ptr::eq(f.0, &raw const points[i]));
         let worth: Vec<&str> = TRADES.iter().filter(is_best).map(|t| t.name).collect();
         table.push(point.cells(&worth.join("; ")));
     }
