@@ -127,7 +127,7 @@ impl FrameLoop {
     /// When there is no such actor.
     pub fn learn(&mut self, actor: usize, clips: &[ClipId]) -> Result<usize, FrameError> {
         check_float_mode()?;
-        self.stage.settle()?;
+        self.settle()?;
         let pool = self.config.pool.clone();
         let mut trees = 0;
         for &clip in clips.iter().filter(|_| self.config.policy == RebuildPolicy::Auto) {
@@ -141,7 +141,7 @@ impl FrameLoop {
         playing: &(impl Fn(usize) -> Playing<'a> + Sync),
     ) -> Result<(Arc<World>, StageTimes), FrameError> {
         check_float_mode()?;
-        self.stage.settle()?;
+        self.settle()?;
         self.take_rebuilds()?;
         let pool = self.config.pool.clone();
         let made = pool.install(|| self.make(playing))?;
@@ -158,6 +158,15 @@ impl FrameLoop {
     /// What the loop did for the last frame.
     pub fn last_frame(&self) -> FrameState {
         self.last
+    }
+
+    /// Forms the groups anew when actors have changed, in the loop's pool.
+    fn settle(&mut self) -> Result<(), FrameError> {
+        if self.stage.is_settled() {
+            return Ok(());
+        }
+        let pool = self.config.pool.clone();
+        pool.install(|| self.stage.settle())
     }
 
     fn rebuilds_in_background(&self) -> bool {

@@ -80,6 +80,11 @@ impl Stage {
         self.settled = false;
     }
 
+    /// True when the groups are those of the actors.
+    pub(super) fn is_settled(&self) -> bool {
+        self.settled
+    }
+
     /// Forms the groups anew when actors have changed; groups whose parts are the same stay as they are.
     pub(super) fn settle(&mut self) -> Result<(), FrameError> {
         if self.settled {
