@@ -1,5 +1,9 @@
 //! Many rays at once, compiled once for every structure and level: for callers who need no filter and no counts.
 
+use std::ops::Range;
+
+use glam::Vec3A;
+
 use super::{AnyAccel, AnyHit, Closest, PACKET, TravRay, packet::bits};
 use crate::{
     geom::{Forms, Hit, Ray, Triangles},
@@ -10,8 +14,8 @@ use crate::{
 impl AnyAccel {
     /// The closest hit of every ray, in order, into `out`; a ray that can hit nothing (see [`TravRay::new`]) misses.
     ///
-    /// Rays go singly where `packet` is 1, else in packets of up to `packet` consecutive ones, which pays for rays close together. The
-    /// answers do not depend on it, nor on `level`. On the calling thread; no allocation.
+    /// Rays go singly where `packet` is 1, else in packets of up to `packet` consecutive ones, which pays for rays close together; structures that answer
+    /// many single rays at once take those that point apart by themselves. The answers do not depend on it, nor on `level`. On the calling thread; no allocation.
     ///
     /// # Errors
     /// When foreign code changed how this thread computes; `out` is then unchanged.
@@ -48,7 +52,15 @@ impl AnyAccel {
     ) -> Result<(), FloatModeError> {
         assert!((1..=PACKET).contains(&packet), "packets of {packet} rays");
         check_float_mode()?;
-        dispatch(level, ClosestBatch { accel: self, prims, rays, packet, forms, out: &mut out[..rays.len()] });
+        let out = &mut out[..rays.len()];
+        for (run, together) in runs(rays, packet, self.streams()) {
+            let (rays, out) = (&rays[run.clone()], &mut out[run]);
+            if together {
+                dispatch(level, ClosestBatch { accel: self, prims, rays, packet, forms, out });
+            } else {
+                self.closest_all(level, prims, rays, forms, out);
+            }
+        }
         Ok(())
     }
 
@@ -88,9 +100,45 @@ impl AnyAccel {
     ) -> Result<(), FloatModeError> {
         assert!((1..=PACKET).contains(&packet), "packets of {packet} rays");
         check_float_mode()?;
-        dispatch(level, BlockedBatch { accel: self, prims, rays, packet, forms, out: &mut out[..rays.len()] });
+        let out = &mut out[..rays.len()];
+        for (run, together) in runs(rays, packet, self.streams()) {
+            let (rays, out) = (&rays[run.clone()], &mut out[run]);
+            if together {
+                dispatch(level, BlockedBatch { accel: self, prims, rays, packet, forms, out });
+            } else {
+                self.occluded_all(level, prims, rays, forms, out);
+            }
+        }
         Ok(())
     }
+}
+
+/// Splits rays, where packets begin, into runs that go together in packets and runs that do not. With `streams` a structure answers rays apart faster than packets of
+/// rays that point into different directions.
+fn runs(rays: &[Ray], packet: usize, streams: bool) -> impl Iterator<Item = (Range<usize>, bool)> + '_ {
+    let mut at = 0;
+    let together = move |at: usize| packet > 1 && !(streams && points_apart(&rays[at..rays.len().min(at + packet)]));
+    std::iter::from_fn(move || {
+        let first = at;
+        let kind = (first < rays.len()).then(|| together(first))?;
+        while at < rays.len() && together(at) == kind {
+            at = if packet == 1 { rays.len() } else { rays.len().min(at + packet) };
+        }
+        Some((first..at, kind))
+    })
+}
+
+/// Directions of a packet may differ by this part of the longest component.
+const NARROW: f32 = 0.5;
+
+/// True when rays point into too different directions to go together.
+fn points_apart(rays: &[Ray]) -> bool {
+    let (mut low, mut high) = (Vec3A::INFINITY, Vec3A::NEG_INFINITY);
+    for ray in rays {
+        let dir = Vec3A::from(ray.dir);
+        (low, high) = (low.min(dir), high.max(dir));
+    }
+    (high - low).max_element() > NARROW * low.abs().max(high.abs()).max_element()
 }
 
 struct ClosestBatch<'a> {
@@ -108,17 +156,6 @@ impl Task for ClosestBatch<'_> {
     #[inline(always)]
     fn run<S: Simd>(self) {
         let Self { accel, prims, rays, packet, forms, out } = self;
-        if packet == 1 {
-            for (ray, out) in rays.iter().zip(out) {
-                *out = None;
-                if let Some(ray) = TravRay::with_forms(ray, forms) {
-                    let mut best = Closest::new(&ray);
-                    accel.closest::<S, _, _>(prims, &ray, &mut best, &AnyHit, &mut ());
-                    *out = best.hit(&ray);
-                }
-            }
-            return;
-        }
         for (rays, out) in rays.chunks(packet).zip(out.chunks_mut(packet)) {
             let Some((rays, active)) = Together::of(rays, forms) else { return };
             let mut best = [Closest::new(&rays.0[0]); PACKET];
@@ -151,15 +188,6 @@ impl Task for BlockedBatch<'_> {
     #[inline(always)]
     fn run<S: Simd>(self) {
         let Self { accel, prims, rays, packet, forms, out } = self;
-        if packet == 1 {
-            for (ray, out) in rays.iter().zip(out) {
-                *out = false;
-                if let Some(ray) = TravRay::with_forms(ray, forms) {
-                    *out = accel.occluded::<S, _, _>(prims, &ray, &AnyHit, &mut ());
-                }
-            }
-            return;
-        }
         for (rays, out) in rays.chunks(packet).zip(out.chunks_mut(packet)) {
             let Some((rays, active)) = Together::of(rays, forms) else { return };
             let count = out.len();

@@ -38,7 +38,7 @@ pub use topology::Cut;
 pub use crate::geom::{Forms, Precision};
 
 use crate::{
-    geom::{Aabb, Triangles},
+    geom::{Aabb, Hit, Ray, Triangles},
     simd::{FloatModeError, Simd},
 };
 
@@ -165,6 +165,8 @@ pub trait Accel: Sized + Clone + Send + Sync + std::fmt::Debug + 'static {
     type Config: AccelConfig;
     /// False when every refit asks for a rebuild.
     const REFITS: bool = true;
+    /// True when [`Accel::closest_all`] and [`Accel::occluded_all`] are faster than packets of rays that point apart.
+    const STREAMS: bool = false;
     /// What its nodes say about what is below them, for reports.
     const NODE_FORMAT: &'static str = "full boxes";
     /// What a walk leaves for rays that start where it ended; `()` where nothing is gained.
@@ -214,6 +216,18 @@ pub trait Accel: Sized + Clone + Send + Sync + std::fmt::Debug + 'static {
         sink: &K,
         count: &mut C,
     ) -> bool;
+
+    /// The closest hit of every ray by itself, into `out`, which is as long: for callers who need no filter and no counts.
+    #[inline(always)]
+    fn closest_all<S: Simd>(&self, prims: &Triangles<'_>, rays: &[Ray], forms: Forms, out: &mut [Option<Hit>]) {
+        run::closest_all::<S, Self>(self, prims, rays, forms, out);
+    }
+
+    /// As [`Accel::closest_all`]: whether every ray is blocked.
+    #[inline(always)]
+    fn occluded_all<S: Simd>(&self, prims: &Triangles<'_>, rays: &[Ray], forms: Forms, out: &mut [bool]) {
+        run::occluded_all::<S, Self>(self, prims, rays, forms, out);
+    }
 
     /// As [`Accel::closest`] for each ray whose bit is set in `active`; `best` and `sinks` go with the rays.
     ///

@@ -65,8 +65,6 @@ pub(super) const SLACK: f32 = f32::MIN_POSITIVE;
 pub struct TravRay {
     range: RayRange,
     ordinary: bool,
-    /// `|origin|∞`.
-    far: f32,
     /// See [`TravRay::is_steady`].
     steady: bool,
     forms: Forms,
@@ -77,7 +75,6 @@ impl TravRay {
     pub(crate) const STAND_IN: Self = Self {
         range: RayRange { origin: Vec3::ZERO, dir: Vec3::X, t_near: 0.0, t_far: 0.0 },
         ordinary: true,
-        far: 0.0,
         steady: true,
         forms: Forms::EXACT,
     };
@@ -94,20 +91,27 @@ impl TravRay {
     #[inline(always)]
     pub fn with_forms(ray: &Ray, forms: Forms) -> Option<Self> {
         let (t_near, t_far) = (ray.t_near, ray.t_far.min(f32::MAX));
-        // Adding +0 turns -0 into +0. Ordinary numbers are finite.
-        let dir = ray.dir + Vec3::ZERO;
-        let (size, place) = (dir.abs(), ray.origin.abs());
-        let ordinary = is_ordinary(size, place);
-        let steady = ordinary && (size.min_element() > 0.0 || slabs::is_steady(size.max_element()));
-        let finite = ordinary || (ray.origin.is_finite() && dir.is_finite());
+        // Adding +0 turns -0 into +0.
+        let dir = Vec3A::from(ray.dir) + Vec3A::ZERO;
+        let (size, place) = (dir.abs(), Vec3A::from(ray.origin).abs());
+        let slanted = size.cmpge(Vec3A::splat(1.0 / ORDINARY_MAX));
+        // NaN fails every comparison. Ordinary numbers are finite.
+        let moderate = size.cmple(Vec3A::splat(ORDINARY_MAX)) & place.cmple(Vec3A::splat(ORDINARY_MAX));
         // A NaN t_far would be lost in `min`, so it is looked at itself.
-        if !finite || dir == Vec3::ZERO || ray.t_far.is_nan() || !(t_near <= t_far && t_far >= 0.0) {
+        if ray.t_far.is_nan() || !(t_near <= t_far && t_far >= 0.0) {
             return None;
         }
+        let (mut ordinary, mut steady) = (true, true);
+        if !(slanted & moderate).all() {
+            if !(ray.origin.is_finite() && dir.is_finite()) || dir == Vec3A::ZERO {
+                return None;
+            }
+            ordinary = ((slanted | size.cmpeq(Vec3A::ZERO)) & moderate).all();
+            steady = ordinary && slabs::is_steady(size.max_element());
+        }
         Some(Self {
-            range: RayRange { origin: ray.origin, dir, t_near: t_near.max(0.0) + 0.0, t_far: t_far + 0.0 },
+            range: RayRange { origin: ray.origin, dir: dir.into(), t_near: t_near.max(0.0) + 0.0, t_far: t_far + 0.0 },
             ordinary,
-            far: place.max_element(),
             steady,
             forms,
         })
@@ -128,7 +132,13 @@ impl TravRay {
     /// The greatest size of the origin's coordinates.
     #[inline(always)]
     pub(super) fn far(&self) -> f32 {
-        self.far
+        Vec3A::from(self.range.origin).abs().max_element()
+    }
+
+    /// True when no coordinate of the origin is larger than this.
+    #[inline(always)]
+    pub(super) fn is_within(&self, reach: f32) -> bool {
+        Vec3A::from(self.range.origin).abs().cmple(Vec3A::splat(reach)).all()
     }
 
     /// True for ordinary rays that run along no plane, or are neither very long nor very short.
@@ -155,15 +165,6 @@ impl TravRay {
 #[inline(always)]
 fn reciprocal(dir: Vec3) -> Vec3 {
     (Vec3A::ONE / Vec3A::from(dir)).into()
-}
-
-/// True when every nonzero |dir| component (`size`) is in [2^-60, 2^60] and |origin| (`place`) is at most 2^60.
-#[inline(always)]
-fn is_ordinary(size: Vec3, place: Vec3) -> bool {
-    let large_enough = size.cmpge(Vec3::splat(1.0 / ORDINARY_MAX)) | size.cmpeq(Vec3::ZERO);
-    // NaN is lost in `max`, so both are compared.
-    let small_enough = size.cmple(Vec3::splat(ORDINARY_MAX)) & place.cmple(Vec3::splat(ORDINARY_MAX));
-    (large_enough & small_enough).all()
 }
 
 /// The least exact hit so far, over any number of structures.

@@ -11,12 +11,12 @@ use super::{
     grug::Grug,
     kdtree::KdTree,
     list::List,
-    run::{ClosestPacketTask, ClosestTask, OccludedPacketTask, OccludedTask},
+    run::{ClosestAllTask, ClosestPacketTask, ClosestTask, OccludedAllTask, OccludedPacketTask, OccludedTask},
     ssh::Ssh,
 };
 use crate::{
-    geom::{Aabb, Triangles},
-    simd::{Simd, check_float_mode},
+    geom::{Aabb, Forms, Hit, Ray, Triangles},
+    simd::{Simd, SimdLevel, check_float_mode, dispatch},
 };
 
 /// A structure's name or a setting that does not exist.
@@ -129,6 +129,13 @@ macro_rules! register_accels {
                 }
             }
 
+            /// As [`Accel::STREAMS`].
+            pub(super) fn streams(&self) -> bool {
+                match self {
+                    $(Self::$kind(_) => <$ty>::STREAMS,)*
+                }
+            }
+
             /// As [`Accel::NODE_FORMAT`].
             pub fn node_format(&self) -> &'static str {
                 match self {
@@ -173,6 +180,34 @@ macro_rules! register_accels {
             ) -> bool {
                 match self {
                     $(Self::$kind(accel) => S::call(OccludedTask { accel, prims, ray, sink, count }),)*
+                }
+            }
+
+            /// As [`Accel::closest_all`].
+            pub(super) fn closest_all(
+                &self,
+                level: SimdLevel,
+                prims: &Triangles<'_>,
+                rays: &[Ray],
+                forms: Forms,
+                out: &mut [Option<Hit>],
+            ) {
+                match self {
+                    $(Self::$kind(accel) => dispatch(level, ClosestAllTask { accel, prims, rays, forms, out }),)*
+                }
+            }
+
+            /// As [`Accel::occluded_all`].
+            pub(super) fn occluded_all(
+                &self,
+                level: SimdLevel,
+                prims: &Triangles<'_>,
+                rays: &[Ray],
+                forms: Forms,
+                out: &mut [bool],
+            ) {
+                match self {
+                    $(Self::$kind(accel) => dispatch(level, OccludedAllTask { accel, prims, rays, forms, out }),)*
                 }
             }
 

@@ -1,8 +1,8 @@
 //! The queries as tasks, so that a structure's kernel is compiled once a level and sink, not at every place that asks.
 
-use super::{Accel, Closest, Counter, HitSink, TravRay, packet::bits};
+use super::{Accel, AnyHit, Closest, Counter, HitSink, TravRay, packet::bits};
 use crate::{
-    geom::Triangles,
+    geom::{Forms, Hit, Ray, Triangles},
     simd::{Simd, Task},
 };
 
@@ -116,5 +116,77 @@ impl<A: Accel, C: Counter, K: HitSink> Task for OccludedPacketTask<'_, A, C, K> 
     fn run<S: Simd>(self) -> u32 {
         let Self { accel, prims, rays, active, sinks, count } = self;
         accel.occluded_packet::<S, C, K>(prims, rays, active, sinks, count)
+    }
+}
+
+/// [`Accel::closest_all`], a ray after the other.
+#[inline(always)]
+pub(super) fn closest_all<S: Simd, A: Accel>(
+    accel: &A,
+    prims: &Triangles<'_>,
+    rays: &[Ray],
+    forms: Forms,
+    out: &mut [Option<Hit>],
+) {
+    for (ray, out) in rays.iter().zip(out) {
+        *out = None;
+        if let Some(ray) = TravRay::with_forms(ray, forms) {
+            let mut best = Closest::new(&ray);
+            S::call(ClosestTask { accel, prims, ray: &ray, best: &mut best, sink: &AnyHit, count: &mut () });
+            *out = best.hit(&ray);
+        }
+    }
+}
+
+/// [`Accel::occluded_all`], a ray after the other.
+#[inline(always)]
+pub(super) fn occluded_all<S: Simd, A: Accel>(
+    accel: &A,
+    prims: &Triangles<'_>,
+    rays: &[Ray],
+    forms: Forms,
+    out: &mut [bool],
+) {
+    for (ray, out) in rays.iter().zip(out) {
+        *out = false;
+        if let Some(ray) = TravRay::with_forms(ray, forms) {
+            *out = S::call(OccludedTask { accel, prims, ray: &ray, sink: &AnyHit, count: &mut () });
+        }
+    }
+}
+
+/// [`Accel::closest_all`].
+pub(super) struct ClosestAllTask<'a, A> {
+    pub(super) accel: &'a A,
+    pub(super) prims: &'a Triangles<'a>,
+    pub(super) rays: &'a [Ray],
+    pub(super) forms: Forms,
+    pub(super) out: &'a mut [Option<Hit>],
+}
+
+impl<A: Accel> Task for ClosestAllTask<'_, A> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self) {
+        self.accel.closest_all::<S>(self.prims, self.rays, self.forms, self.out);
+    }
+}
+
+/// [`Accel::occluded_all`].
+pub(super) struct OccludedAllTask<'a, A> {
+    pub(super) accel: &'a A,
+    pub(super) prims: &'a Triangles<'a>,
+    pub(super) rays: &'a [Ray],
+    pub(super) forms: Forms,
+    pub(super) out: &'a mut [bool],
+}
+
+impl<A: Accel> Task for OccludedAllTask<'_, A> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self) {
+        self.accel.occluded_all::<S>(self.prims, self.rays, self.forms, self.out);
     }
 }

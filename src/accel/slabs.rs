@@ -4,7 +4,12 @@
 //! `(plane - o) * (1/d)`; but the error is at most a few roundings of `o * (1/d)`, which is known before any plane is. The exact form
 //! moves that term outward by its error, entries down and exits up. The fast form leaves it as it is.
 
-use super::{TravRay, query::ORDINARY_MAX};
+use glam::Vec3;
+
+use super::{
+    TravRay,
+    query::{ORDINARY_MAX, SLACK},
+};
 use crate::{
     geom::Precision,
     simd::{Lanes, Simd},
@@ -21,7 +26,7 @@ const GROW: f32 = 1.0 + PAD;
 const FAR: f32 = 1024.0;
 
 /// Greatest `|d|∞`, and the inverse of the least, of rays along a plane: 2^30.
-const STEADY: f32 = 1_073_741_824.0;
+pub(super) const STEADY: f32 = 1_073_741_824.0;
 
 /// How many times a plane's distance is magnified where the ray runs along it: 2^25.
 const STEEP: f32 = 33_554_432.0;
@@ -89,7 +94,7 @@ impl<L: Lanes<Elem = f32>> Slab<L> {
 /// True when [`Slab`] is proven for the ray and planes up to `reach` from 0.
 #[inline(always)]
 pub(super) fn fits(ray: &TravRay, reach: f32) -> bool {
-    ray.is_steady() && ray.far() <= FAR * reach && reach <= ORDINARY_MAX
+    ray.is_steady() && ray.is_within(FAR * reach) && reach <= ORDINARY_MAX
 }
 
 /// True for a `|d|∞` that [`Slab`] is proven for where the ray runs along a plane.
@@ -135,6 +140,46 @@ pub(super) fn of_ray<S: Simd>(ray: &TravRay, reach: f32) -> [Slab<f32>; 3] {
         out[axis] = Slab { entry_mul: muls[0], entry_add: adds[0], exit_mul: -muls[2], exit_add: -adds[2] };
     }
     out
+}
+
+/// One ray on three axes, a lane each: [`Slab`] with summands that hold the slack of comparisons as well.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Line {
+    pub(super) entry_mul: [f32; 4],
+    pub(super) entry_add: [f32; 4],
+    pub(super) exit_mul: [f32; 4],
+    pub(super) exit_add: [f32; 4],
+}
+
+impl Line {
+    #[inline(always)]
+    pub(super) fn new<S: Simd>(ray: &TravRay, reach: f32) -> Self {
+        let Vec3 { x, y, z } = ray.range().dir;
+        // No lane that divides by something else: what underflows costs more than a walk.
+        let dir = S::F4::load(&[x, y, z, 1.0]);
+        let Vec3 { x, y, z } = ray.range().origin;
+        let origin = S::F4::load(&[x, y, z, 0.0]);
+        let (mut inv, mut raise) = (S::F4::splat(1.0) / dir, S::F4::splat(SLACK));
+        let zero = S::F4::splat(0.0);
+        let along = dir.le(zero) & zero.le(dir);
+        if along != 0 {
+            let size = S::F4::splat(ray.range().dir.abs().max_element());
+            inv = S::F4::select(along, S::F4::splat(STEEP) / size, inv);
+            raise = S::F4::select(along, S::F4::splat((ray.far() + reach) * 1.001) / size, raise);
+        }
+        let (shrink, grow, pad) = match ray.forms().nodes {
+            Precision::Exact => (SHRINK, GROW, PAD),
+            Precision::Fast => (1.0, 1.0, 0.0),
+        };
+        let (entry_mul, exit_mul) = (inv * S::F4::splat(shrink), inv * S::F4::splat(grow));
+        let (entry, exit, pad) = (origin * entry_mul, origin * exit_mul, S::F4::splat(pad));
+        let mut out = Self { entry_mul: [0.0; 4], entry_add: [0.0; 4], exit_mul: [0.0; 4], exit_add: [0.0; 4] };
+        entry_mul.store(&mut out.entry_mul);
+        (-(entry + entry.abs() * pad)).store(&mut out.entry_add);
+        exit_mul.store(&mut out.exit_mul);
+        (exit.abs() * pad - exit + raise).store(&mut out.exit_add);
+        out
+    }
 }
 
 #[cfg(test)]

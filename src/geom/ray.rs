@@ -4,14 +4,15 @@ use glam::Vec3;
 ///
 /// `dir` may have any length; `t_near >= 0`; `t_far` may be infinite. NaN anywhere, a zero direction or
 /// `t_far < t_near` makes every query a miss.
+#[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ray {
     /// Start point.
     pub origin: Vec3,
-    /// Direction, of any nonzero length.
-    pub dir: Vec3,
     /// Least parameter that counts.
     pub t_near: f32,
+    /// Direction, of any nonzero length.
+    pub dir: Vec3,
     /// Greatest parameter that counts.
     pub t_far: f32,
 }

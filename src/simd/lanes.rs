@@ -49,6 +49,13 @@ pub trait Simd: Copy + Send + Sync + 'static {
     /// In each lane the number of `table` whose place is in the word's three bits from bit `RIGHT` on.
     fn picked<const RIGHT: i32>(table: Self::F8, words: Self::U8) -> Self::F8;
 
+    /// Writes the words whose bit is set, in order; any of the words or 0 may follow.
+    fn compress(words: &[u32; 8], chosen: u32, to: &mut [u32; 8]);
+
+    /// Orders the lanes whose bit is set by their numbers, which are finite and not negative, the greatest first: writes a key of each, and its word. The lowest three
+    /// bits of a number do not count; equal ones go by lane. See [`key_floor`](super::key_floor). Anything may follow.
+    fn descending(numbers: Self::F8, chosen: u32, words: &[u32; 8], keys: &mut [u32; 8], sorted: &mut [u32; 8]);
+
     /// Runs `task` in a function of its own, compiled for this level once for all callers: for work that is worth a
     /// call but not a copy at every call site.
     fn call<T: Task>(task: T) -> T::Output;

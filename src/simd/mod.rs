@@ -10,7 +10,9 @@ mod dispatch;
 mod float_mode;
 mod lanes;
 mod level;
+mod ordered;
 mod scalar;
+mod stack;
 #[cfg(target_arch = "x86_64")]
 mod x86;
 
@@ -19,7 +21,9 @@ pub use dispatch::{Task, dispatch};
 pub use float_mode::{FloatModeError, check_float_mode};
 pub use lanes::{Halves, Lanes, Simd};
 pub use level::SimdLevel;
+pub use ordered::key_floor;
 pub use scalar::{Array, Scalar};
+pub use stack::Stack;
 
 #[cfg(test)]
 mod float_mode_tests;

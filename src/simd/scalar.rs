@@ -3,7 +3,7 @@ use std::{
     ops::{Add, Div, Mul, Neg, Sub},
 };
 
-use super::{Halves, Lanes, Simd, SimdLevel, Task};
+use super::{Halves, Lanes, Simd, SimdLevel, Task, ordered::key};
 
 /// Portable code.
 #[derive(Clone, Copy, Debug)]
@@ -58,6 +58,32 @@ impl Simd for Scalar {
     #[inline(always)]
     fn picked<const RIGHT: i32>(table: Self::F8, words: [u32; 8]) -> Self::F8 {
         Array(words.map(|word| table.0[(word >> RIGHT & 7) as usize]))
+    }
+
+    #[inline(always)]
+    fn compress(words: &[u32; 8], chosen: u32, to: &mut [u32; 8]) {
+        let mut len = 0;
+        for (i, word) in words.iter().enumerate() {
+            to[len & 7] = *word;
+            len += (chosen >> i & 1) as usize;
+        }
+    }
+
+    #[inline(always)]
+    fn descending(numbers: Self::F8, chosen: u32, words: &[u32; 8], keys: &mut [u32; 8], sorted: &mut [u32; 8]) {
+        let mut len = 0;
+        for (lane, (&number, &word)) in (0..).zip(numbers.0.iter().zip(words)) {
+            if chosen >> lane & 1 == 1 {
+                let key = key(number, lane);
+                let mut at = len;
+                while at > 0 && keys[at - 1] < key {
+                    (keys[at], sorted[at]) = (keys[at - 1], sorted[at - 1]);
+                    at -= 1;
+                }
+                (keys[at], sorted[at]) = (key, word);
+                len += 1;
+            }
+        }
     }
 
     #[inline(never)]

@@ -2,7 +2,7 @@
 
 use proptest::prelude::*;
 
-use super::{Halves, Lanes, Simd, SimdLevel, Task, dispatch};
+use super::{Halves, Lanes, Simd, SimdLevel, Stack, Task, dispatch, key_floor};
 
 /// Bits of every operation's result on three rows of numbers; NaN of any kind is one value.
 struct Operations<'a> {
@@ -160,5 +160,69 @@ fn levels_are_ordered_and_the_least_is_always_there() {
     assert_eq!(SimdLevel::available().last(), Some(SimdLevel::best()));
     for level in SimdLevel::ALL {
         assert_eq!(level.name().parse(), Ok(level));
+    }
+}
+
+/// The chosen words in order, then the keys and words of the chosen lanes by descending number.
+struct Chosen {
+    numbers: [f32; 8],
+    words: [u32; 8],
+    chosen: u32,
+}
+
+impl Task for Chosen {
+    type Output = [Vec<u32>; 3];
+
+    #[inline(always)]
+    fn run<S: Simd>(self) -> Self::Output {
+        let count = self.chosen.count_ones() as usize;
+        let (mut compressed, mut keys, mut sorted) = ([0; 8], [0; 8], [0; 8]);
+        S::compress(&self.words, self.chosen, &mut compressed);
+        S::descending(S::F8::load(&self.numbers), self.chosen, &self.words, &mut keys, &mut sorted);
+        [compressed, keys, sorted].map(|words| words[..count].to_vec())
+    }
+}
+
+proptest! {
+    #[test]
+    fn chosen_lanes_are_kept_in_order_and_sorted_by_their_numbers(
+        numbers in prop::array::uniform8(prop_oneof![Just(0.0_f32), 0.0_f32..4.0, 0.0_f32..=f32::MAX]),
+        words in prop::array::uniform8(any::<u32>()),
+        chosen in 0_u32..256,
+    ) {
+        let lanes: Vec<usize> = (0..8).filter(|&lane| chosen >> lane & 1 == 1).collect();
+        for level in SimdLevel::available() {
+            let [compressed, keys, sorted] = dispatch(level, Chosen { numbers, words, chosen });
+            prop_assert_eq!(compressed, lanes.iter().map(|&lane| words[lane]).collect::<Vec<_>>(), "{}", level);
+            let mut due = lanes.clone();
+            due.sort_by_key(|&lane| std::cmp::Reverse((numbers[lane].to_bits() >> 3, lane)));
+            prop_assert_eq!(sorted, due.iter().map(|&lane| words[lane]).collect::<Vec<_>>(), "{}", level);
+            for (&key, &lane) in keys.iter().zip(&due) {
+                let floor = key_floor(key);
+                prop_assert!(key > 0 && floor <= numbers[lane] && numbers[lane].to_bits() - floor.to_bits() < 8);
+            }
+        }
+    }
+
+    #[test]
+    fn stacks_give_back_what_was_pushed_last(steps in prop::collection::vec(prop::option::of(any::<u64>()), 0..64)) {
+        let (mut stack, mut model) = (Stack::<u64, 64>::new(), Vec::new());
+        for step in steps {
+            if let Some(value) = step {
+                stack.push(value);
+                model.push(value);
+            } else {
+                prop_assert_eq!(stack.pop(), model.pop());
+            }
+        }
+    }
+}
+
+#[test]
+#[should_panic(expected = "index out of bounds")]
+fn full_stacks_refuse_more() {
+    let mut stack = Stack::<u8, 2>::new();
+    for value in 0..3 {
+        stack.push(value);
     }
 }

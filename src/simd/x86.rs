@@ -9,6 +9,7 @@ use std::ops::{Add, Div, Mul, Neg, Sub};
 use super::{
     Halves, Lanes, Simd, SimdLevel, Task,
     dispatch::{call_avx2, call_avx512},
+    ordered::{BASE, LANE},
 };
 
 /// Calls one intrinsic.
@@ -79,6 +80,20 @@ impl Simd for Avx2 {
     }
 
     #[inline(always)]
+    fn compress(words: &[u32; 8], chosen: u32, to: &mut [u32; 8]) {
+        let order = load_words(&COMPRESS[(chosen & 0xff) as usize]);
+        store_words(call!(_mm256_permutevar8x32_epi32(load_words(words), order)), to);
+    }
+
+    #[inline(always)]
+    fn descending(numbers: F32x8, chosen: u32, words: &[u32; 8], to_keys: &mut [u32; 8], to_words: &mut [u32; 8]) {
+        let lanes = call!(_mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128));
+        let bits = call!(_mm256_and_si256(call!(_mm256_set1_epi32(chosen.cast_signed())), lanes));
+        let keys = call!(_mm256_and_si256(keys(numbers), call!(_mm256_cmpeq_epi32(bits, lanes))));
+        sort(keys, words, to_keys, to_words);
+    }
+
+    #[inline(always)]
     fn call<T: Task>(task: T) -> T::Output {
         // SAFETY: the type is private to this module, so code names it only below a dispatch that found its features.
         unsafe { call_avx2(task) }
@@ -140,6 +155,18 @@ impl Simd for Avx512 {
     }
 
     #[inline(always)]
+    #[expect(clippy::cast_possible_truncation, reason = "a bit a lane")]
+    fn compress(words: &[u32; 8], chosen: u32, to: &mut [u32; 8]) {
+        store_words(call!(_mm256_maskz_compress_epi32(chosen as u8, load_words(words))), to);
+    }
+
+    #[inline(always)]
+    #[expect(clippy::cast_possible_truncation, reason = "a bit a lane")]
+    fn descending(numbers: F32x8, chosen: u32, words: &[u32; 8], to_keys: &mut [u32; 8], to_words: &mut [u32; 8]) {
+        sort(call!(_mm256_maskz_mov_epi32(chosen as u8, keys(numbers))), words, to_keys, to_words);
+    }
+
+    #[inline(always)]
     fn call<T: Task>(task: T) -> T::Output {
         // SAFETY: the type is private to this module, so code names it only below a dispatch that found its features.
         unsafe { call_avx512(task) }
@@ -157,6 +184,64 @@ fn load_words(from: &[u32; 8]) -> __m256i {
     // SAFETY: the array is as long as the unaligned load; AVX is in the level (module head).
     unsafe { _mm256_loadu_si256(from.as_ptr().cast()) }
 }
+
+#[inline(always)]
+fn store_words(words: __m256i, to: &mut [u32; 8]) {
+    // SAFETY: the array is as long as the unaligned store; AVX is in the level (module head).
+    unsafe { _mm256_storeu_si256(to.as_mut_ptr().cast(), words) };
+}
+
+/// The keys of [`Simd::descending`], all lanes.
+#[inline(always)]
+fn keys(numbers: F32x8) -> __m256i {
+    let lane = call!(_mm256_set1_epi32(LANE.cast_signed()));
+    let high = call!(_mm256_andnot_si256(lane, call!(_mm256_castps_si256(numbers.0))));
+    let base = BASE.cast_signed();
+    let low = call!(_mm256_setr_epi32(base, base + 1, base + 2, base + 3, base + 4, base + 5, base + 6, base + 7));
+    call!(_mm256_add_epi32(high, low))
+}
+
+/// One step of a sorting network: of each pair of lanes, one here and one in `other`, the lesser goes to those whose bit is set in `LESSER`.
+#[inline(always)]
+fn exchanged<const LESSER: i32>(keys: __m256i, other: __m256i) -> __m256i {
+    let (greater, lesser) = (call!(_mm256_max_epu32(keys, other)), call!(_mm256_min_epu32(keys, other)));
+    call!(_mm256_blend_epi32::<LESSER>(greater, lesser))
+}
+
+/// Writes keys in descending order, and the words of their lanes.
+#[inline(always)]
+fn sort(keys: __m256i, words: &[u32; 8], to_keys: &mut [u32; 8], to_words: &mut [u32; 8]) {
+    const PAIRS: i32 = 0b10_11_00_01;
+    const MIRROR: i32 = 0b00_01_10_11;
+    const HALVES: i32 = 0b01_00_11_10;
+    let keys = exchanged::<0b1010_1010>(keys, call!(_mm256_shuffle_epi32::<PAIRS>(keys)));
+    let keys = exchanged::<0b1100_1100>(keys, call!(_mm256_shuffle_epi32::<MIRROR>(keys)));
+    let keys = exchanged::<0b1010_1010>(keys, call!(_mm256_shuffle_epi32::<PAIRS>(keys)));
+    let mirror = call!(_mm256_setr_epi32(7, 6, 5, 4, 3, 2, 1, 0));
+    let keys = exchanged::<0b1111_0000>(keys, call!(_mm256_permutevar8x32_epi32(keys, mirror)));
+    let keys = exchanged::<0b1100_1100>(keys, call!(_mm256_shuffle_epi32::<HALVES>(keys)));
+    let keys = exchanged::<0b1010_1010>(keys, call!(_mm256_shuffle_epi32::<PAIRS>(keys)));
+    store_words(keys, to_keys);
+    store_words(call!(_mm256_permutevar8x32_epi32(load_words(words), keys)), to_words);
+}
+
+/// For every choice among eight lanes, the chosen ones in order.
+static COMPRESS: [[u32; 8]; 256] = {
+    let mut table = [[0; 8]; 256];
+    let mut chosen = 0;
+    while chosen < 256 {
+        let (mut lane, mut len) = (0, 0);
+        while lane < 8 {
+            if chosen >> lane & 1 == 1 {
+                table[chosen][len] = lane as u32;
+                len += 1;
+            }
+            lane += 1;
+        }
+        chosen += 1;
+    }
+    table
+};
 
 /// Comparison into a bit mask, by vector compare and move or by mask register.
 macro_rules! compare {

@@ -7,93 +7,247 @@ use super::{
 use crate::{
     accel::{
         Closest, Counter, HitSink, TravRay,
+        block::BlockRay,
         block::TriBlock,
         query::SLACK,
-        slabs::{self, Slab},
+        slabs::{self, Line},
+        topology::MAX_DEPTH,
         wide::{
-            WIDTH,
+            Place, Tree, WIDTH,
             walk::{self, Kernel},
         },
     },
-    simd::{Lanes, Scalar, Simd, Task},
+    simd::{Lanes, Scalar, Simd, Stack, Task},
 };
 
-/// All boxes at once, in f32. The proof at [`Slab`] holds lane by lane; with 2^-126 of slack on the comparison a box that the ray meets within
-/// `[t_near, limit]` is never lost.
-struct FastKernel<S: Simd> {
-    slabs: [Slab<f32>; 3],
+/// A ray against eight boxes at once, in f32. The proof at [`Slab`](crate::accel::slabs::Slab) holds lane by lane; with 2^-126 of slack on exits a box that the ray meets
+/// within `[t_near, limit]` is never lost.
+///
+/// Numbers are spread over lanes where they are used: that is a load.
+pub(super) struct Boxes {
+    line: Line,
     /// 1 where the ray runs downward.
-    backward: [usize; 3],
-    t_near: S::F8,
-    limit: S::F8,
+    backward: [u8; 3],
+    t_near: f32,
     /// The limit with slack.
-    cull: f32,
+    limit: f32,
 }
 
-impl<S: Simd> FastKernel<S> {
+impl Boxes {
     #[inline(always)]
-    fn new(ray: &TravRay, reach: f32, limit: f32) -> Self {
-        let (range, slabs) = (ray.range(), slabs::of_ray::<S>(ray, reach));
-        let dir = range.dir;
+    pub(super) fn new<S: Simd>(ray: &TravRay, reach: f32, limit: f32) -> Self {
+        let dir = ray.range().dir;
         Self {
-            slabs,
-            backward: [usize::from(dir.x < 0.0), usize::from(dir.y < 0.0), usize::from(dir.z < 0.0)],
-            t_near: S::F8::splat(range.t_near),
-            limit: S::F8::splat(limit),
-            cull: limit + SLACK,
+            line: Line::new::<S>(ray, reach),
+            backward: [u8::from(dir.x < 0.0), u8::from(dir.y < 0.0), u8::from(dir.z < 0.0)],
+            t_near: ray.range().t_near,
+            limit: limit + SLACK,
+        }
+    }
+
+    /// Nothing beyond counts any more.
+    #[inline(always)]
+    pub(super) fn set_limit(&mut self, limit: f32) {
+        self.limit = limit + SLACK;
+    }
+
+    /// False when what the ray enters there lies beyond the limit.
+    #[inline(always)]
+    pub(super) fn reaches(&self, entry: f32) -> bool {
+        entry <= self.limit
+    }
+
+    /// Where the ray enters each child, and bits of the children that it may meet before the limit. Each walk waits for this, so the chain of operations is as
+    /// short as can be.
+    #[inline(always)]
+    pub(super) fn test<S: Simd>(&self, node: &Node) -> (S::F8, u32) {
+        let (t_near, limit) = (S::F8::splat(self.t_near), S::F8::splat(self.limit));
+        let (mut entries, mut exits) = ([t_near; 3], [limit; 3]);
+        let Line { entry_mul, entry_add, exit_mul, exit_add } = &self.line;
+        for axis in 0..3 {
+            let side = usize::from(self.backward[axis] & 1);
+            let (first, last) = (S::F8::load(&node.planes[axis][side]), S::F8::load(&node.planes[axis][side ^ 1]));
+            entries[axis] = first.mul_add_loose(S::F8::splat(entry_mul[axis]), S::F8::splat(entry_add[axis]));
+            exits[axis] = last.mul_add_loose(S::F8::splat(exit_mul[axis]), S::F8::splat(exit_add[axis]));
+        }
+        let near = entries[0].max(entries[1]).max(entries[2].max(t_near));
+        let far = exits[0].min(exits[1]).min(exits[2].min(limit));
+        (near, near.le(far))
+    }
+}
+
+/// A child to visit: its link below the bits of where the ray enters it, which order as the entries do, for they are not negative.
+#[inline(always)]
+fn due(entry: f32, link: Link) -> u64 {
+    u64::from(entry.to_bits()) << 32 | u64::from(link.bits())
+}
+
+/// The link of a due child.
+#[inline(always)]
+#[expect(clippy::cast_possible_truncation, reason = "the lower half")]
+fn link_of(due: u64) -> Link {
+    Link::from_bits(due as u32)
+}
+
+/// Where the ray enters a due child.
+#[inline(always)]
+#[expect(clippy::cast_possible_truncation, reason = "the upper half")]
+fn entry_of(due: u64) -> f32 {
+    f32::from_bits((due >> 32) as u32)
+}
+
+/// Length of stacks: all children but one at every level, and room to add eight at once.
+pub(super) const MAX_STACK: usize = MAX_DEPTH * (WIDTH - 1) + WIDTH;
+
+/// Number of the lowest set bit, in a form that bounds checks understand.
+#[inline(always)]
+fn first(hits: u32) -> usize {
+    (hits.trailing_zeros() & 7) as usize
+}
+
+/// Offers the triangles of a leaf.
+pub(super) struct ClosestLeaf<'a, C, K> {
+    pub(super) tree: &'a Bvh8,
+    pub(super) link: Link,
+    pub(super) ray: &'a TravRay,
+    pub(super) best: &'a mut Closest,
+    pub(super) sink: &'a K,
+    pub(super) count: &'a mut C,
+}
+
+impl<C: Counter, K: HitSink> Task for ClosestLeaf<'_, C, K> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self) {
+        let Self { tree, link, ray, best, sink, count } = self;
+        let block_ray = BlockRay::new(ray, tree.reach);
+        for block in tree.leaf_blocks(link, count) {
+            block.closest::<S, C, K>(ray, &block_ray, best, sink, count);
         }
     }
 }
 
-impl<S: Simd> Kernel<Bvh8> for FastKernel<S> {
-    type Mark = f32;
-    type Kids = [f32; WIDTH];
+/// Whether a triangle of a leaf blocks a ray.
+pub(super) struct OccludedLeaf<'a, C, K> {
+    pub(super) tree: &'a Bvh8,
+    pub(super) link: Link,
+    pub(super) ray: &'a TravRay,
+    pub(super) sink: &'a K,
+    pub(super) count: &'a mut C,
+}
+
+impl<C: Counter, K: HitSink> Task for OccludedLeaf<'_, C, K> {
+    type Output = bool;
 
     #[inline(always)]
-    fn kids() -> [f32; WIDTH] {
-        [0.0; WIDTH]
-    }
-
-    #[inline(always)]
-    fn test(&self, node: &Node, _entry: f32, entries: &mut [f32; WIDTH]) -> u32 {
-        let (mut near, mut far) = (self.t_near, self.limit);
-        for axis in 0..3 {
-            let (side, slab) = (self.backward[axis] & 1, &self.slabs[axis]);
-            let (first, last) = (S::F8::load(&node.planes[axis][side]), S::F8::load(&node.planes[axis][side ^ 1]));
-            let entry = first.mul_add_loose(S::F8::splat(slab.entry_mul), S::F8::splat(slab.entry_add));
-            let exit = last.mul_add_loose(S::F8::splat(slab.exit_mul), S::F8::splat(slab.exit_add));
-            near = entry.max(near);
-            far = exit.min(far);
+    fn run<S: Simd>(self) -> bool {
+        let Self { tree, link, ray, sink, count } = self;
+        let block_ray = BlockRay::new(ray, tree.reach);
+        for block in tree.leaf_blocks(link, count) {
+            if block.occluded::<S, C, K>(ray, &block_ray, sink, count) {
+                return true;
+            }
         }
-        near.store(entries);
-        (near - far).le(S::F8::splat(SLACK))
+        false
     }
+}
 
-    #[inline(always)]
-    fn mark(entries: &[f32; WIDTH], slot: usize) -> f32 {
-        entries[slot]
+/// Offers the triangles below a node or leaf to a ray whose f32 tests are proven, nearest children first.
+#[inline(always)]
+fn closest<S: Simd, C: Counter, K: HitSink>(
+    tree: &Bvh8,
+    start: Link,
+    ray: &TravRay,
+    best: &mut Closest,
+    sink: &K,
+    count: &mut C,
+) {
+    let mut boxes = Boxes::new::<S>(ray, tree.reach, best.t_cull());
+    let mut stack = Stack::<u64, MAX_STACK>::new();
+    let mut link = start;
+    loop {
+        if link.is_leaf() {
+            // Called, so that it claims none of the walk's registers.
+            S::call(ClosestLeaf { tree, link, ray, best, sink, count });
+            boxes.set_limit(best.t_cull());
+        } else {
+            count.node();
+            let node = &tree.nodes[link.index()];
+            let (near, mut hits) = boxes.test::<S>(node);
+            if hits != 0 {
+                let mut entries = [0.0; WIDTH];
+                near.store(&mut entries);
+                let child = |slot: usize| due(entries[slot], node.links[slot]);
+                let slot = first(hits);
+                hits &= hits - 1;
+                if hits == 0 {
+                    link = node.links[slot].predicted();
+                    continue;
+                }
+                let (mut near, mut far) = (child(slot), child(first(hits)));
+                hits &= hits - 1;
+                if far < near {
+                    (near, far) = (far, near);
+                }
+                if hits == 0 {
+                    stack.push(far);
+                    link = link_of(near).predicted();
+                    continue;
+                }
+                let mut keys = [near, far, 0, 0, 0, 0, 0, 0];
+                let mut len = 2;
+                while hits != 0 {
+                    keys[len & 7] = child(first(hits));
+                    hits &= hits - 1;
+                    len += 1;
+                }
+                walk::sort(&mut keys, len);
+                for &key in keys[1..len].iter().rev() {
+                    stack.push(key);
+                }
+                link = link_of(keys[0]);
+                continue;
+            }
+        }
+        link = loop {
+            let Some(due) = stack.pop() else { return };
+            if boxes.reaches(entry_of(due)) {
+                break link_of(due);
+            }
+        };
     }
+}
 
-    #[inline(always)]
-    fn key(entries: &[f32; WIDTH], slot: usize) -> u64 {
-        walk::key32(entries[slot], slot)
-    }
-
-    #[inline(always)]
-    fn limit(&mut self, best: &Closest) {
-        let limit = best.t_cull();
-        self.cull = limit + SLACK;
-        self.limit = S::F8::splat(limit);
-    }
-
-    #[inline(always)]
-    fn reopened(&self, entry: f32) -> Option<f32> {
-        (entry <= self.cull).then_some(entry)
-    }
-
-    #[inline(always)]
-    fn may_meet<T: Simd>(&self, _block: &TriBlock, _entry: f32) -> bool {
-        true
+/// True when a triangle below a node or leaf blocks a ray whose f32 tests are proven.
+#[inline(always)]
+fn occluded<S: Simd, C: Counter, K: HitSink>(tree: &Bvh8, start: Link, ray: &TravRay, sink: &K, count: &mut C) -> bool {
+    let boxes = Boxes::new::<S>(ray, tree.reach, ray.range().t_far);
+    let mut stack = Stack::<Link, MAX_STACK>::new();
+    let mut link = start;
+    loop {
+        if link.is_leaf() {
+            if S::call(OccludedLeaf { tree, link, ray, sink, count }) {
+                return true;
+            }
+        } else {
+            count.node();
+            let node = &tree.nodes[link.index()];
+            let (_, mut hits) = boxes.test::<S>(node);
+            if hits != 0 {
+                link = node.links[first(hits)].predicted();
+                hits &= hits - 1;
+                while hits != 0 {
+                    stack.push(node.links[first(hits)]);
+                    hits &= hits - 1;
+                }
+                continue;
+            }
+        }
+        match stack.pop() {
+            Some(next) => link = next,
+            None => return false,
+        }
     }
 }
 
@@ -182,8 +336,7 @@ impl<C: Counter, K: HitSink> Task for ClosestFrom<'_, C, K> {
     #[inline(always)]
     fn run<S: Simd>(self) {
         let Self { tree, start, ray, best, sink, count } = self;
-        let test = FastKernel::<S>::new(ray, tree.reach, best.t_cull());
-        walk::closest::<S, _, _, C, K>(tree, test, (start, ray.range().t_near), ray, best, sink, count);
+        closest::<S, C, K>(tree, start, ray, best, sink, count);
     }
 }
 
@@ -202,8 +355,7 @@ impl<C: Counter, K: HitSink> Task for OccludedFrom<'_, C, K> {
     #[inline(always)]
     fn run<S: Simd>(self) -> bool {
         let Self { tree, start, ray, sink, count } = self;
-        let test = FastKernel::<S>::new(ray, tree.reach, ray.range().t_far);
-        walk::occluded::<S, _, _, C, K>(tree, &test, (start, ray.range().t_near), ray, sink, count)
+        occluded::<S, C, K>(tree, start, ray, sink, count)
     }
 }
 
@@ -227,8 +379,7 @@ impl Bvh8 {
         count: &mut C,
     ) {
         if self.fits(ray) {
-            // Called, so that packets which fall apart share the code.
-            S::call(ClosestFrom { tree: self, start: Self::root(), ray, best, sink, count });
+            closest::<S, C, K>(self, Self::root(), ray, best, sink, count);
         } else {
             self.closest_wide(ray, best, sink, count);
         }
@@ -237,7 +388,13 @@ impl Bvh8 {
     /// Rare, so compiled once, not for every level.
     #[cold]
     #[inline(never)]
-    fn closest_wide<C: Counter, K: HitSink>(&self, ray: &TravRay, best: &mut Closest, sink: &K, count: &mut C) {
+    pub(super) fn closest_wide<C: Counter, K: HitSink>(
+        &self,
+        ray: &TravRay,
+        best: &mut Closest,
+        sink: &K,
+        count: &mut C,
+    ) {
         let (test, start) = (WideKernel::new(ray, best.t_high()), (Self::root(), f64::from(ray.range().t_near)));
         walk::closest::<Scalar, _, _, C, K>(self, test, start, ray, best, sink, count);
     }
@@ -250,7 +407,7 @@ impl Bvh8 {
         count: &mut C,
     ) -> bool {
         if self.fits(ray) {
-            S::call(OccludedFrom { tree: self, start: Self::root(), ray, sink, count })
+            occluded::<S, C, K>(self, Self::root(), ray, sink, count)
         } else {
             self.occluded_wide(ray, sink, count)
         }
@@ -258,7 +415,7 @@ impl Bvh8 {
 
     #[cold]
     #[inline(never)]
-    fn occluded_wide<C: Counter, K: HitSink>(&self, ray: &TravRay, sink: &K, count: &mut C) -> bool {
+    pub(super) fn occluded_wide<C: Counter, K: HitSink>(&self, ray: &TravRay, sink: &K, count: &mut C) -> bool {
         let (near, far) = (f64::from(ray.range().t_near), f64::from(ray.range().t_far));
         walk::occluded::<Scalar, _, _, C, K>(self, &WideKernel::new(ray, far), (Self::root(), near), ray, sink, count)
     }
@@ -269,7 +426,6 @@ impl Bvh8 {
 #[inline(always)]
 pub(super) fn met<S: Simd>(ray: &TravRay, node: &Node, reach: f32) -> [u32; 2] {
     let t_far = ray.range().t_far;
-    let (fast, wide) = (FastKernel::<S>::new(ray, reach, t_far), WideKernel::new(ray, f64::from(t_far)));
-    let (mut entries, mut wide_entries) = ([0.0; WIDTH], [0.0; WIDTH]);
-    [fast.test(node, 0.0, &mut entries), wide.test(node, 0.0, &mut wide_entries)]
+    let (fast, wide) = (Boxes::new::<S>(ray, reach, t_far), WideKernel::new(ray, f64::from(t_far)));
+    [fast.test::<S>(node).1, wide.test(node, 0.0, &mut [0.0; WIDTH])]
 }

@@ -6,13 +6,15 @@
 //!
 //! # Source
 //! Wald, Benthin and Boulos, "Getting Rid of Packets", 2008, for nodes of many children against one ray; Ylitie, Karras and Laine, "Efficient Incoherent
-//! Ray Traversal on GPUs Through Compressed Wide BVHs", 2017, for the choice of the nodes. Departure: rays that lie close together go in packets.
+//! Ray Traversal on GPUs Through Compressed Wide BVHs", 2017, for the choice of the nodes. Departure: rays that lie close together go in packets, and of
+//! many single rays several are in flight (`stream.rs`).
 //!
 //! Cost: build O(n log n) and refit O(n) on the current rayon pool; a block takes 160 bytes. Choose it for rays.
 
 mod kernel;
 mod node;
 mod packet;
+mod stream;
 mod validate;
 
 use super::{
@@ -28,7 +30,7 @@ use super::{
     },
 };
 use crate::{
-    geom::{Aabb, Triangles},
+    geom::{Aabb, Forms, Hit, Ray, Triangles},
     simd::Simd,
 };
 use node::{Link, MAX_BLOCKS, Node};
@@ -188,6 +190,7 @@ impl Refittable for Bvh8 {
 
 impl Accel for Bvh8 {
     const NAME: &'static str = "bvh8";
+    const STREAMS: bool = true;
     type Config = Bvh8Config;
     type RayState = ();
 
@@ -235,6 +238,16 @@ impl Accel for Bvh8 {
         count: &mut C,
     ) -> bool {
         self.walk_occluded::<S, C, K>(ray, sink, count)
+    }
+
+    #[inline(always)]
+    fn closest_all<S: Simd>(&self, _prims: &Triangles<'_>, rays: &[Ray], forms: Forms, out: &mut [Option<Hit>]) {
+        stream::closest::<S>(self, rays, forms, out);
+    }
+
+    #[inline(always)]
+    fn occluded_all<S: Simd>(&self, _prims: &Triangles<'_>, rays: &[Ray], forms: Forms, out: &mut [bool]) {
+        stream::occluded::<S>(self, rays, forms, out);
     }
 
     #[inline(always)]

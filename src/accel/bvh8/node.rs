@@ -28,7 +28,7 @@ const FIRST: u32 = (1 << COUNT_SHIFT) - 1;
 ///
 /// Bit 31 marks a leaf; bits 28..31 are its block count less one, bits 0..28 its first block.
 #[repr(transparent)]
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
 pub(in crate::accel) struct Link(u32);
 
 impl Link {
@@ -42,6 +42,22 @@ impl Link {
     pub(super) fn leaf(first: usize, count: usize) -> Self {
         debug_assert!((1..=MAX_LEAF_BLOCKS).contains(&count) && first <= MAX_BLOCKS);
         Self(LEAF | ((count as u32 - 1) << COUNT_SHIFT) | first as u32)
+    }
+
+    #[inline(always)]
+    pub(super) fn bits(self) -> u32 {
+        self.0
+    }
+
+    #[inline(always)]
+    pub(super) fn from_bits(bits: u32) -> Self {
+        Self(bits)
+    }
+
+    /// The words of all children.
+    #[inline(always)]
+    pub(super) fn words(links: &[Self; WIDTH]) -> &[u32; WIDTH] {
+        bytemuck::cast_ref(links)
     }
 
     /// Number of blocks of a leaf that has some.

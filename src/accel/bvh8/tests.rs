@@ -8,8 +8,8 @@ use super::{
     packet::met_together,
 };
 use crate::{
-    accel::{Accel, AccelKind, TravRay, slabs, wide::WIDTH},
-    geom::{Aabb, Ray, Triangles},
+    accel::{Accel, AccelKind, AnyHit, Closest, Forms, TravRay, slabs, wide::WIDTH},
+    geom::{Aabb, Hit, Ray, Triangles},
     simd::{Simd, SimdLevel, Task, dispatch},
 };
 
@@ -110,6 +110,73 @@ proptest! {
         for level in SimdLevel::available() {
             let found = dispatch(level, Met { ray: &ray, node: &node(aabb), reach: aabb.reach() });
             prop_assert_eq!(found, [HALF; 4], "{}", level);
+        }
+    }
+}
+
+/// The closest hit of a ray and whether it is blocked, asked for by itself.
+struct Alone<'a> {
+    tree: &'a Bvh8,
+    prims: &'a Triangles<'a>,
+    ray: &'a TravRay,
+}
+
+impl Task for Alone<'_> {
+    type Output = (Option<Hit>, bool);
+
+    #[inline(always)]
+    fn run<S: Simd>(self) -> Self::Output {
+        let Self { tree, prims, ray } = self;
+        let mut best = Closest::new(ray);
+        tree.closest::<S, _, _>(prims, ray, &mut best, &AnyHit, &mut ());
+        (best.hit(ray), tree.occluded::<S, _, _>(prims, ray, &AnyHit, &mut ()))
+    }
+}
+
+/// The same of many rays.
+struct InFlight<'a> {
+    tree: &'a Bvh8,
+    prims: &'a Triangles<'a>,
+    rays: &'a [Ray],
+}
+
+impl Task for InFlight<'_> {
+    type Output = (Vec<Option<Hit>>, Vec<bool>);
+
+    #[inline(always)]
+    fn run<S: Simd>(self) -> Self::Output {
+        let Self { tree, prims, rays } = self;
+        let (mut hits, mut blocked) = (vec![None; rays.len()], vec![false; rays.len()]);
+        tree.closest_all::<S>(prims, rays, Forms::EXACT, &mut hits);
+        tree.occluded_all::<S>(prims, rays, Forms::EXACT, &mut blocked);
+        (hits, blocked)
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 200, failure_persistence: None, ..ProptestConfig::default() })]
+
+    /// Some rays run along axes, some are too steep for f32, some are none.
+    #[test]
+    fn rays_in_flight_find_what_each_finds_alone(
+        corners in prop::collection::vec(prop::array::uniform3(prop::array::uniform3(-8_i8..8)), 0..80),
+        rays in prop::collection::vec(
+            (prop::array::uniform3(-12_i8..12), prop::array::uniform3(-3_i8..4), prop_oneof![6 => Just(1.0_f32), 1 => Just(1e-30), 1 => Just(f32::NAN)]),
+            0..40,
+        ),
+    ) {
+        let point = |p: [i8; 3]| Vec3::from(p.map(f32::from)) * 0.5;
+        let positions: Vec<_> = corners.iter().flatten().map(|&p| point(p)).collect();
+        let indices: Vec<_> = (0..).step_by(3).take(corners.len()).map(|i| [i, i + 1, i + 2]).collect();
+        let prims = Triangles { positions: &positions, indices: &indices, topology_epoch: 0 };
+        let tree = Bvh8::build(&prims, &Bvh8Config::default()).unwrap();
+        let rays: Vec<_> = rays.iter().map(|&(o, d, scale)| Ray::new(point(o), point(d) * scale)).collect();
+        for level in SimdLevel::available() {
+            let (hits, blocked) = dispatch(level, InFlight { tree: &tree, prims: &prims, rays: &rays });
+            for (i, ray) in rays.iter().enumerate() {
+                let alone = TravRay::new(ray).map(|ray| dispatch(level, Alone { tree: &tree, prims: &prims, ray: &ray }));
+                prop_assert_eq!((hits[i], blocked[i]), alone.unwrap_or((None, false)), "{} {:?}", level, ray);
+            }
         }
     }
 }

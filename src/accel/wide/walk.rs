@@ -128,7 +128,7 @@ pub(in crate::accel) fn closest<S: Simd, T: Tree, N: Kernel<T>, C: Counter, K: H
 
 /// Sorts the first `len` keys, at least three: most nodes that more than two children are left of have three or four, which take no branches.
 #[inline(always)]
-fn sort(keys: &mut [u64; WIDTH], len: usize) {
+pub(in crate::accel) fn sort(keys: &mut [u64; WIDTH], len: usize) {
     if len <= 4 {
         if len == 3 {
             keys[3] = u64::MAX;

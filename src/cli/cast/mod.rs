@@ -92,7 +92,8 @@ pub(crate) fn run(args: &CastArgs, settings: &Settings) -> Result<(), CliError> 
         any_hit: args.any_hit,
         packet: args.packet,
     };
-    let (records, mut seconds) = settings.pool.install(|| queries.run(&rays, args.repeat));
+    let cast = settings.pool.install(|| queries.run(&rays, args.repeat));
+    let (records, mut seconds) = cast.map_err(|e| CliError::failed(e.to_string()))?;
     if let Some(path) = &args.hits {
         let mut file = AtomicFile::create(path, &Unfinished::default())?;
         file.write(b"HIT1")?;

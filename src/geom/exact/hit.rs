@@ -8,14 +8,15 @@ use super::{
 };
 
 /// A ray's line and the finite closed range of `t` that counts.
+#[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RayRange {
     /// Start point, finite.
     pub origin: Vec3,
-    /// Direction, finite and not zero.
-    pub dir: Vec3,
     /// Least parameter, finite and not negative.
     pub t_near: f32,
+    /// Direction, finite and not zero.
+    pub dir: Vec3,
     /// Greatest parameter, finite.
     pub t_far: f32,
 }
