@@ -47,9 +47,14 @@ fn add(world: &mut CollisionWorld, mesh: &Mesh) {
     world.add_mesh("soup", mesh.positions.clone(), mesh.indices.clone(), DAffine3::IDENTITY).expect("a valid mesh");
 }
 
+/// Whether a triangle is met.
+type Meets<'a> = Box<dyn Fn(&[Vec3; 3]) -> bool + 'a>;
+
 fn world_of(meshes: &[&Mesh]) -> Snapshot {
     let mut world = empty();
-    meshes.iter().for_each(|mesh| add(&mut world, mesh));
+    for mesh in meshes {
+        add(&mut world, mesh);
+    }
     world.snapshot().expect("a snapshot")
 }
 
@@ -174,7 +179,6 @@ proptest! {
         let aabb = Aabb { min, max: min + size.abs() };
         let hull = ConvexHull::new(&other).unwrap();
         let turned = oriented_box(min.as_dvec3(), size.abs().as_dvec3(), DQuat::from_xyzw(0.5, 0.5, 0.5, 0.5)).unwrap();
-        type Meets<'a> = Box<dyn Fn(&[Vec3; 3]) -> bool + 'a>;
         let shapes: Vec<(Shape<'_>, Meets<'_>)> = vec![
             (Shape::Box(aabb), Box::new(|t| triangle_meets_box(t, &aabb))),
             (Shape::Sphere { center: min, radius }, Box::new(|t| triangle_meets_sphere(t, min, radius))),

@@ -90,7 +90,7 @@ fn broad(count: usize, calm: bool) {
     let mut ours = BroadPhase::default();
     ours.update(&first);
     let leaves = |boxes: &[Aabb]| boxes.iter().map(parry_box).enumerate().collect::<Vec<_>>();
-    let mut refitted = Bvh::from_iter(BvhBuildStrategy::Binned, leaves(&first).into_iter());
+    let mut refitted = Bvh::from_iter(BvhBuildStrategy::Binned, leaves(&first));
     let mut space = BvhWorkspace::default();
     let (mut t_ours, mut t_refit, mut t_build) = (vec![], vec![], vec![]);
     let mut pairs: Vec<[u32; 2]> = Vec::new();

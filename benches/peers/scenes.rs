@@ -7,7 +7,7 @@ use kinora::{geom::Aabb, glam::Vec3};
 /// Frames of every scene.
 pub(crate) const FRAMES: usize = 60;
 
-/// SplitMix64 (Steele, Lea, Flood, "Fast splittable pseudorandom number generators", 2014).
+/// `SplitMix64` (Steele, Lea, Flood, "Fast splittable pseudorandom number generators", 2014).
 pub(crate) struct Random(pub(crate) u64);
 
 impl Random {

@@ -224,7 +224,7 @@ mod tests {
     fn hulls_of_bad_points_are_errors() {
         assert!(matches!(ConvexHull::new(&[]), Err(CollideError::Count { .. })));
         assert!(matches!(ConvexHull::new(&[Vec3::NAN]), Err(CollideError::NotFinite { .. })));
-        assert!(matches!(ConvexHull::new(&[Vec3::ZERO; 5000]), Err(CollideError::TooMany { .. })));
+        assert!(matches!(ConvexHull::new(&vec![Vec3::ZERO; 5000]), Err(CollideError::TooMany { .. })));
         assert!(matches!(ConvexHull::of_box(&Aabb::EMPTY, &DAffine3::IDENTITY), Err(CollideError::EmptyBox { .. })));
     }
 }

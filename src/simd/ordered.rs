@@ -2,7 +2,10 @@
 pub(super) const LANE: u32 = 7;
 
 /// Added to keys, so that those of 0 differ from no key.
-pub(super) const BASE: u32 = 8;
+pub(super) const BASE: u32 = LEAST_KEY;
+
+/// The least key that [`Simd::descending`](super::Simd::descending) makes.
+pub const LEAST_KEY: u32 = 8;
 
 /// The key by which [`Simd::descending`](super::Simd::descending) orders a number of a lane; greater than 0.
 #[inline(always)]

@@ -164,13 +164,13 @@ fn levels_are_ordered_and_the_least_is_always_there() {
 }
 
 /// The chosen words in order, then the keys and words of the chosen lanes by descending number.
-struct Chosen {
+struct Selection {
     numbers: [f32; 8],
     words: [u32; 8],
     chosen: u32,
 }
 
-impl Task for Chosen {
+impl Task for Selection {
     type Output = [Vec<u32>; 3];
 
     #[inline(always)]
@@ -192,7 +192,7 @@ proptest! {
     ) {
         let lanes: Vec<usize> = (0..8).filter(|&lane| chosen >> lane & 1 == 1).collect();
         for level in SimdLevel::available() {
-            let [compressed, keys, sorted] = dispatch(level, Chosen { numbers, words, chosen });
+            let [compressed, keys, sorted] = dispatch(level, Selection { numbers, words, chosen });
             prop_assert_eq!(compressed, lanes.iter().map(|&lane| words[lane]).collect::<Vec<_>>(), "{}", level);
             let mut due = lanes.clone();
             due.sort_by_key(|&lane| std::cmp::Reverse((numbers[lane].to_bits() >> 3, lane)));

@@ -230,10 +230,10 @@ static COMPRESS: [[u32; 8]; 256] = {
     let mut table = [[0; 8]; 256];
     let mut chosen = 0;
     while chosen < 256 {
-        let (mut lane, mut len) = (0, 0);
+        let (mut lane, mut len) = (0_u32, 0);
         while lane < 8 {
             if chosen >> lane & 1 == 1 {
-                table[chosen][len] = lane as u32;
+                table[chosen][len] = lane;
                 len += 1;
             }
             lane += 1;

@@ -91,7 +91,6 @@ fn link_of(due: u64) -> Link {
 
 /// Where the ray enters a due child.
 #[inline(always)]
-#[expect(clippy::cast_possible_truncation, reason = "the upper half")]
 fn entry_of(due: u64) -> f32 {
     f32::from_bits((due >> 32) as u32)
 }

@@ -14,7 +14,7 @@ use crate::{
         slabs::{Extent, Slab},
         wide::{
             WIDTH,
-            packet::{Entry, GROW, PacketTree, Spread, Together, range, spreads},
+            packet::{Entry, GROW, PacketTree, Spread, Start, Together, range, spreads},
             walk,
         },
     },
@@ -163,12 +163,7 @@ impl PacketTree for Bvh8 {
     type Packet<S: Simd> = Packet<S>;
 
     #[inline(always)]
-    fn start<S: Simd>(
-        &self,
-        packet: &PacketRays,
-        rays: (u32, [bool; 3]),
-        nodes: Precision,
-    ) -> (Packet<S>, Option<Entry<S, Self, Packet<S>>>) {
+    fn start<S: Simd>(&self, packet: &PacketRays, rays: (u32, [bool; 3]), nodes: Precision) -> Start<S, Self> {
         let together = Packet::<S>::new(packet, rays, self.reach, nodes);
         let root = Entry { word: Self::root(), mask: rays.0, mark: (), rays: together.near };
         (together, Some(root))

@@ -15,7 +15,7 @@ use crate::{
         wide::{Place, WIDTH},
     },
     geom::{Forms, Hit, Ray},
-    simd::{Scalar, Simd, key_floor},
+    simd::{LEAST_KEY, Scalar, Simd, key_floor},
 };
 
 impl Bvh8 {
@@ -72,7 +72,7 @@ impl Flight {
         self.ray = ray;
         self.number = number;
         self.len = 1;
-        (self.keys[0], self.links[0]) = (WIDTH as u32, Bvh8::root().bits());
+        (self.keys[0], self.links[0]) = (LEAST_KEY, Bvh8::root().bits());
     }
 
     #[inline(always)]

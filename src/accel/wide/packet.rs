@@ -73,18 +73,17 @@ pub(in crate::accel) struct Entry<S: Simd, T: Tree, P: Together<S, T>> {
     pub(in crate::accel) rays: P::Rays,
 }
 
+/// A packet, and the root for those of its rays that may meet it.
+pub(in crate::accel) type Start<S, T> =
+    (<T as PacketTree>::Packet<S>, Option<Entry<S, T, <T as PacketTree>::Packet<S>>>);
+
 /// A tree whose packets are walked together.
 pub(in crate::accel) trait PacketTree: Tree + Accel {
     /// Its packets.
     type Packet<S: Simd>: Together<S, Self>;
 
     /// A packet of rays with `backward` signs, and the root for those that may meet it.
-    fn start<S: Simd>(
-        &self,
-        packet: &PacketRays,
-        rays: (u32, [bool; 3]),
-        nodes: Precision,
-    ) -> (Self::Packet<S>, Option<Entry<S, Self, Self::Packet<S>>>);
+    fn start<S: Simd>(&self, packet: &PacketRays, rays: (u32, [bool; 3]), nodes: Precision) -> Start<S, Self>;
 }
 
 /// As [`Accel::closest_packet`].

@@ -1,6 +1,6 @@
 //! `--continuous`: contacts between the last frame and this one, and when they came about.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, HashMap, btree_map::Entry};
 
 use kinora::{
     collide::{
@@ -53,16 +53,17 @@ impl Between {
             }
             // A pair that meets now and did not at the start touched in between; where no feature of its own was asked, it is asked now.
             for contact in contacts.iter() {
-                let key = key(&contact.pair);
-                if !toi_s.contains_key(&key) {
+                if let Entry::Vacant(place) = toi_s.entry(key(&contact.pair)) {
                     let impact = last.snapshot.first_impact(snapshot, contact.pair, settings)?;
                     let share = impact.map_or(1.0, |impact| impact.time);
-                    toi_s.insert(key, last.time_s + (time_s - last.time_s) * share);
+                    place.insert(last.time_s + (time_s - last.time_s) * share);
                 }
             }
             *contacts = touched.into_values().collect();
         } else {
-            contacts.iter().for_each(|c| note(key(&c.pair), time_s));
+            for contact in contacts.iter() {
+                note(key(&contact.pair), time_s);
+            }
         }
         Ok(Self { toi_s })
     }
@@ -118,7 +119,9 @@ impl Around {
         let at = self.0.entry(part).or_insert_with(|| {
             let mut at = vec![Vec::new(); view.vertices().len()];
             for (triangle, corners) in (0..).zip(view.triangles()) {
-                corners.iter().for_each(|&c| at[c as usize].push(triangle));
+                for &corner in corners {
+                    at[corner as usize].push(triangle);
+                }
             }
             at
         });

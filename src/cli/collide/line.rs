@@ -16,6 +16,7 @@ pub(super) struct Line<'a> {
     /// Node path, part of the mesh and copy of every part.
     pub(super) paths: &'a [(String, u32, Option<u32>)],
     /// Only with `--continuous`; `None` for the end of a contact.
+    #[expect(clippy::option_option, reason = "left out, or null")]
     pub(super) toi_s: Option<Option<f64>>,
 }
 
@@ -46,6 +47,7 @@ struct Json<'a> {
     normal: [f64; 3],
     depth: f64,
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[expect(clippy::option_option, reason = "left out, or null")]
     toi_s: Option<Option<f64>>,
 }
 

@@ -101,7 +101,7 @@ mod tests {
     fn triangles_in_one_plane_and_without_area_are_parted_by_nothing() {
         let a = [Vec3::ZERO, Vec3::X * 4.0, Vec3::Y * 4.0];
         let (normal, depth) = shortest_way_out(&a, &a.map(|p| p + Vec3::new(0.5, 0.5, 0.0)));
-        assert!(depth == 0.0 && normal.z.abs() == 1.0, "{normal} {depth}");
+        assert!(depth.to_bits() == 0 && normal.z.abs().to_bits() == 1_f64.to_bits(), "{normal} {depth}");
         let point = [Vec3::ONE; 3];
         let (normal, depth) = shortest_way_out(&point, &point);
         assert!(depth == 0.0 && normal.is_normalized());

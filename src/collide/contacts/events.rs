@@ -135,7 +135,10 @@ mod tests {
         Contact { pair, dim: 0, segment: [point; 2], point, normal: DVec3::X, depth }
     }
 
-    fn told(events: &[ContactEvent]) -> Vec<(ContactPhase, [u32; 2], Option<[u32; 2]>, usize, f64)> {
+    /// Phase, parts, triangles, count and depth.
+    type Told = (ContactPhase, [u32; 2], Option<[u32; 2]>, usize, f64);
+
+    fn told(events: &[ContactEvent]) -> Vec<Told> {
         events.iter().map(|e| (e.phase, e.parts.map(|p| p.0), e.triangles, e.count, e.depth)).collect()
     }
 

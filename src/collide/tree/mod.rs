@@ -269,10 +269,11 @@ impl Boxes for Triangles<'_> {
                 (rows[0][lane], rows[1][lane], rows[2][lane]) = (p.x, p.y, p.z);
             }
         }
-        for axis in 0..3 {
-            let [a, b, c] = [0, 1, 2].map(|corner: usize| S::F8::load(&corners[corner][axis]));
-            a.min(b).min(c).store(&mut leaf.min[axis]);
-            a.max(b).max(c).store(&mut leaf.max[axis]);
+        let [a, b, c] = &corners;
+        for (axis, (min, max)) in leaf.min.iter_mut().zip(&mut leaf.max).enumerate() {
+            let (a, b, c) = (S::F8::load(&a[axis]), S::F8::load(&b[axis]), S::F8::load(&c[axis]));
+            a.min(b).min(c).store(min);
+            a.max(b).max(c).store(max);
         }
     }
 }

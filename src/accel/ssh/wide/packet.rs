@@ -14,7 +14,7 @@ use crate::{
         ssh::packet::{self as slabs, PacketSlabs},
         wide::{
             WIDTH, WideNode,
-            packet::{Entry, GROW, PacketTree, Together, range, spreads},
+            packet::{Entry, GROW, PacketTree, Start, Together, range, spreads},
             walk,
         },
     },
@@ -171,7 +171,7 @@ impl<const K: usize> PacketTree for Wide<K> {
         packet: &PacketRays,
         (active, backward): (u32, [bool; 3]),
         _nodes: Precision,
-    ) -> (Packet<S>, Option<Entry<S, Self, Packet<S>>>) {
+    ) -> Start<S, Self> {
         let together = Packet::<S>::new(packet, active, backward);
         let rays = together.slabs.clipped(&self.bounds);
         let mask = rays.open() & active;
