@@ -197,7 +197,7 @@ fn what_cannot_be_used_ends_in_exit_2_with_a_reason_and_no_files() {
         assert!(message.contains(reason), "{message}");
         assert!(!out.join("structures.json").exists());
     };
-    refuses(&["frames"], "possible values: ");
+    refuses(&["weather"], "possible values: ");
     refuses(&["structures", "missing.glb"], "missing.glb");
     refuses(&["structures", &mesh, "--baseline", "missing.json"], "missing.json: cannot read");
     refuses(&["structures", &mesh, "--baseline", &mesh], "no report");

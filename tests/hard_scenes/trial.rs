@@ -246,7 +246,11 @@ impl Trial<'_> {
         // The flat lists handle an event where `list` tests a triangle, which takes longer.
         let budget = if candidate.kind == AccelKind::List { budget } else { budget / 30 };
         let most = if candidate.slow { (budget / self.mesh.indices.len().max(1)).max(1) } else { self.rays };
-        let step = self.rays.div_ceil(most);
+        // Scenes take turns among two or three kinds of rays: a share has some of each.
+        let mut step = self.rays.div_ceil(most);
+        while step > 1 && (step.is_multiple_of(2) || step.is_multiple_of(3)) {
+            step += 1;
+        }
         let picked: Vec<_> = (0..rays.len()).filter(|i| (first + i).is_multiple_of(step)).collect();
         let (rays, truths): (Vec<Ray>, Vec<&Option<Truth>>) = picked.iter().map(|&i| (rays[i], &truths[i])).unzip();
         rays.par_chunks(GRAIN)
