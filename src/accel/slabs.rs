@@ -26,7 +26,7 @@ const GROW: f32 = 1.0 + PAD;
 const FAR: f32 = 1024.0;
 
 /// Greatest `|d|∞`, and the inverse of the least, of rays along a plane: 2^30.
-pub(super) const STEADY: f32 = 1_073_741_824.0;
+const STEADY: f32 = 1_073_741_824.0;
 
 /// How many times a plane's distance is magnified where the ray runs along it: 2^25.
 const STEEP: f32 = 33_554_432.0;

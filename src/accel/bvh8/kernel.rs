@@ -7,8 +7,7 @@ use super::{
 use crate::{
     accel::{
         Closest, Counter, HitSink, TravRay,
-        block::BlockRay,
-        block::TriBlock,
+        block::{BlockRay, TriBlock},
         query::SLACK,
         slabs::{self, Line},
         topology::MAX_DEPTH,

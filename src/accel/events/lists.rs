@@ -89,20 +89,26 @@ pub(crate) fn sort(events: &mut [Event]) {
     events.sort_unstable_by_key(|e| e.key());
 }
 
+/// Brings the event at `next` to its place among those before it, which are in order: the place.
+#[inline(always)]
+pub(super) fn insert(events: &mut [Event], next: usize) -> usize {
+    let event = events[next];
+    let key = event.key();
+    let mut at = next;
+    while at > 0 && events[at - 1].key() > key {
+        events[at] = events[at - 1];
+        at -= 1;
+    }
+    events[at] = event;
+    at
+}
+
 /// Sorts events that were in order before a motion: insertion, O(n + inversions), until the swaps pass n log n.
 pub(crate) fn resort(events: &mut [Event]) -> Inversions {
     let budget = events.len() as u64 * u64::from(events.len().max(2).ilog2());
     let mut swaps = 0;
     for next in 1..events.len() {
-        let event = events[next];
-        let key = event.key();
-        let mut at = next;
-        while at > 0 && events[at - 1].key() > key {
-            events[at] = events[at - 1];
-            at -= 1;
-        }
-        events[at] = event;
-        swaps += (next - at) as u64;
+        swaps += (next - insert(events, next)) as u64;
         if swaps > budget {
             sort(events);
             return Inversions { swaps, whole: 1 };

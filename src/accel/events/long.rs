@@ -9,7 +9,7 @@
 //! Graham, "Spearman's Footrule as a Measure of Disarray", 1977.
 #![expect(clippy::cast_possible_truncation, reason = "lists hold fewer than 2^32 events")]
 
-use super::lists::{Event, Inversions, sort};
+use super::lists::{Event, Inversions, insert, sort};
 use crate::simd::{Simd, SimdLevel, Task, dispatch};
 
 /// Lists of fewer events are sorted by insertion or comparison: [`resort`](super::lists::resort).
@@ -166,14 +166,7 @@ impl Task for Insert<'_> {
             if next == events.len() {
                 break;
             }
-            let event = events[next];
-            let key = event.key();
-            let mut at = next;
-            while at > 0 && events[at - 1].key() > key {
-                events[at] = events[at - 1];
-                at -= 1;
-            }
-            events[at] = event;
+            let at = insert(events, next);
             swaps += (next - at) as u64;
             next += 1;
             if at < end {
