@@ -71,12 +71,17 @@ pub fn triangle_distance(a: &[Vec3; 3], b: &[Vec3; 3]) -> Option<Nearest> {
 const EDGES: [(usize, usize); 3] = [(0, 1), (1, 2), (2, 0)];
 
 /// The point of a segment nearest to `p`.
-pub(super) fn to_segment(p: DVec3, [a, b]: [DVec3; 2]) -> Nearest {
+pub(super) fn to_segment(p: DVec3, ends: [DVec3; 2]) -> Nearest {
+    Nearest::between(p, on_segment(p, ends))
+}
+
+#[inline(always)]
+fn on_segment(p: DVec3, [a, b]: [DVec3; 2]) -> DVec3 {
     let way = b - a;
     let square = way.length_squared();
     let t = if square > 0.0 { ((p - a).dot(way) / square).clamp(0.0, 1.0) } else { 0.0 };
     // From the nearer end, so that an end is met exactly.
-    Nearest::between(p, if t <= 0.5 { a + way * t } else { b - way * (1.0 - t) })
+    if t <= 0.5 { a + way * t } else { b - way * (1.0 - t) }
 }
 
 /// The point of a triangle nearest to `p`.
@@ -91,7 +96,10 @@ pub(super) fn to_triangle(p: DVec3, &[a, b, c]: &[DVec3; 3]) -> Nearest {
             return Nearest::between(p, a + e1 * u + e2 * v);
         }
     }
-    to_segment(p, [a, b]).or(to_segment(p, [b, c])).or(to_segment(p, [c, a]))
+    let on_edges = [on_segment(p, [a, b]), on_segment(p, [b, c]), on_segment(p, [c, a])];
+    let [x, y, z] = [on_edges[0].distance_squared(p), on_edges[1].distance_squared(p), on_edges[2].distance_squared(p)];
+    let first = if y < x { (y, on_edges[1]) } else { (x, on_edges[0]) };
+    Nearest::between(p, if z < first.0 { on_edges[2] } else { first.1 })
 }
 
 /// Squared sine below which a triangle counts as its edges: they are then within 2^-45 of its length from all of it.

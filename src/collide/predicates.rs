@@ -15,12 +15,13 @@ use crate::geom::exact::{BOUND, area, volume};
 /// -1, 0 or 1.
 pub(super) type Sign = i8;
 
+#[inline(always)]
 pub(super) fn sign(value: f64) -> Sign {
     i8::from(value > 0.0) - i8::from(value < 0.0)
 }
 
 /// The sign of `(a - d) . ((b - d) x (c - d))`: on which side of the plane through a, b, c the point d lies. 0 on it, and for a, b, c on one line.
-#[inline]
+#[inline(always)]
 pub(super) fn side(a: Vec3, b: Vec3, c: Vec3, d: Vec3) -> Sign {
     // Written out: `map` over an array often stays a call.
     let d64 = d.as_dvec3();
@@ -33,6 +34,7 @@ pub(super) fn side(a: Vec3, b: Vec3, c: Vec3, d: Vec3) -> Sign {
     side_exactly(a, b, c, d)
 }
 
+#[inline(always)]
 fn norm1(e: DVec3) -> f64 {
     e.x.abs() + e.y.abs() + e.z.abs()
 }
@@ -63,6 +65,7 @@ pub(super) struct Plane {
 }
 
 impl Plane {
+    #[inline(always)]
     pub(super) fn new(corners: [Vec3; 3]) -> Self {
         let a = corners[0].as_dvec3();
         let (e1, e2) = (corners[1].as_dvec3() - a, corners[2].as_dvec3() - a);
@@ -77,13 +80,14 @@ impl Plane {
     ///
     /// A term is a product of three differences; the differences (3 ε with ε = 2^-53), two products, the subtraction inside of the
     /// cross product and two sums put it off by at most 8 ε of its size, and the sizes sum up to at most `|d - a|∞ |e1|₁ |e2|₁`.
+    #[inline(always)]
     pub(super) fn height(&self, d: Vec3) -> (f64, f64) {
         let from = d.as_dvec3() - self.corners[0].as_dvec3();
         (self.normal.dot(from), self.reach * from.abs().max_element())
     }
 
     /// As [`side`] of the corners and `d`.
-    #[inline]
+    #[inline(always)]
     pub(super) fn side(&self, d: Vec3) -> Sign {
         let (height, error) = self.height(d);
         if height.abs() > error {

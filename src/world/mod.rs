@@ -8,6 +8,7 @@
 //! Batches ([`World::hit_all`], [`World::block_all`]) ask [`crate::simd::check_float_mode`] themselves; single rays and packets do not.
 
 mod batch;
+mod border;
 mod group;
 mod packet;
 mod query;
@@ -27,6 +28,7 @@ use crate::{
     scene::{PartInstance, Scene},
 };
 
+pub(crate) use border::{BINS, cheapest_border};
 pub(crate) use group::{GroupFrame, GroupLayout};
 pub(crate) use slab::SlabRay;
 pub(crate) use top::Top;

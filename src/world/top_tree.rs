@@ -1,7 +1,5 @@
+use super::border::{BINS, cheapest_border};
 use crate::geom::Aabb;
-
-/// Bins of the surface-area heuristic.
-const BINS: usize = 12;
 
 /// Depth from which splits halve the count: at most 32 more levels for any number of boxes.
 const SAH_DEPTH: usize = 16;
@@ -87,7 +85,7 @@ fn partition(items: &mut [Item]) -> usize {
         return items.len() / 2;
     }
     let bin = |item: &Item| bin_of((item.aabb.center()[axis] - centers.min[axis]) * scale);
-    let border = cheapest_border(items, bin);
+    let border = cheapest_border(items.iter().map(|item| (bin(item), item.aabb)), 1);
     items.sort_unstable_by_key(|item| (bin(item) >= border, item.group));
     let mid = items.partition_point(|item| bin(item) < border);
     if mid == 0 || mid == items.len() { items.len() / 2 } else { mid }
@@ -96,34 +94,6 @@ fn partition(items: &mut [Item]) -> usize {
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "`as` saturates; NaN is bin 0")]
 fn bin_of(place: f32) -> usize {
     (place as usize).min(BINS - 1)
-}
-
-/// The bin that the second half begins with: least area times count, earliest first.
-fn cheapest_border(items: &[Item], bin: impl Fn(&Item) -> usize) -> usize {
-    let mut bins = [(Aabb::EMPTY, 0_usize); BINS];
-    for item in items {
-        let (aabb, count) = &mut bins[bin(item)];
-        *aabb = aabb.union(item.aabb);
-        *count += 1;
-    }
-    let weigh = |(aabb, count): (Aabb, usize)| if count == 0 { 0.0 } else { aabb.half_area() * count as f32 };
-    let join = |a: (Aabb, usize), b: (Aabb, usize)| (a.0.union(b.0), a.1 + b.1);
-    let mut right = [0.0; BINS];
-    let mut sum = (Aabb::EMPTY, 0);
-    for at in (1..BINS).rev() {
-        sum = join(sum, bins[at]);
-        right[at] = weigh(sum);
-    }
-    let mut best = (f32::INFINITY, BINS / 2);
-    let mut left = (Aabb::EMPTY, 0);
-    for at in 1..BINS {
-        left = join(left, bins[at - 1]);
-        let cost = weigh(left) + right[at];
-        if cost < best.0 {
-            best = (cost, at);
-        }
-    }
-    best.1
 }
 
 #[cfg(test)]

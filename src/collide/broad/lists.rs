@@ -1,24 +1,26 @@
-//! A hierarchy of sorted event lists: neighbouring boxes in volumes, each with one list of their lower ends along an axis.
+//! A hierarchy of sorted event lists: neighbouring boxes in volumes, each with one list of its boxes in the order of their lower ends along an axis.
 //!
-//! Lists are sorted again by insertion, which costs as much as the order has changed; volumes whose boxes meet are swept together.
-//! Flat lists over everything lose to trees at any size, since along one axis nearly everything overlaps nearly everything.
+//! Lists are sorted again by insertion, which costs as much as the order has changed. Then their boxes stand in blocks of eight by component, in that
+//! order. A box is compared with a block at a time, and not with blocks that begin after its end or end before its beginning. Volumes whose boxes
+//! meet are swept together. Flat lists over everything lose to trees at any size, since along one axis nearly everything overlaps nearly everything.
 //!
 //! # Source
 //! The volumes are those of Fournier and Poulin, "A Ray Tracing Accelerator Based on a Hierarchy of 1D Sorted Lists", 1993, filled from a
 //! tree; the sort is that of Baraff, "Dynamic Simulation of Non-Penetrating Rigid Bodies", 1992.
 
-use std::ops::{ControlFlow, Range};
+use std::ops::ControlFlow;
 
 use crate::{
-    collide::{
-        boxes_meet,
-        tree::{PairVisitor, Tree},
-    },
+    collide::tree::{Ends, Node, PairVisitor, Tree, WIDTH},
     geom::Aabb,
+    simd::{Simd, SimdLevel, Task, dispatch},
 };
 
+/// Blocks a volume.
+const BLOCKS: usize = 4;
+
 /// Boxes a volume.
-const VOLUME: usize = 32;
+const VOLUME: usize = BLOCKS * WIDTH;
 
 /// A lower end along the axis, and whose it is.
 #[derive(Clone, Copy, Debug)]
@@ -32,6 +34,10 @@ pub(super) struct Lists {
     /// Build of the tree that the volumes were taken of.
     build: u64,
     ends: Vec<End>,
+    /// The boxes, a block for every eight ends.
+    blocks: Vec<Node>,
+    /// Around the boxes of each block.
+    around: Vec<Aabb>,
     volumes: Vec<Aabb>,
     /// Over the volumes.
     tree: Tree,
@@ -54,19 +60,30 @@ impl Lists {
         }
         let axis = self.axis;
         self.volumes.clear();
+        self.blocks.clear();
+        self.around.clear();
         for list in self.ends.chunks_mut(VOLUME) {
-            let mut bounds = Aabb::EMPTY;
             for end in list.iter_mut() {
                 let aabb = &boxes[end.owner as usize];
                 // Empty boxes come last and meet nothing.
-                let is_empty = aabb.is_empty();
-                end.low = if is_empty { f32::INFINITY } else { aabb.min[axis] };
-                if !is_empty {
-                    bounds = bounds.union(*aabb);
-                }
+                end.low = if aabb.is_empty() { f32::INFINITY } else { aabb.min[axis] };
             }
             sort_again(list);
-            self.volumes.push(bounds);
+            let mut volume = Ends::EMPTY;
+            for run in list.chunks(WIDTH) {
+                let mut block = Node::new(true);
+                let mut ends = [Ends::EMPTY; WIDTH];
+                for (lane, end) in run.iter().enumerate() {
+                    ends[lane] = Ends::new(&boxes[end.owner as usize]);
+                    block.links[lane] = end.owner;
+                    block.count += 1;
+                }
+                let (around, _) = block.take(&ends);
+                self.blocks.push(block);
+                self.around.push(around.aabb());
+                volume = volume.union(around);
+            }
+            self.volumes.push(volume.aabb());
         }
         let volumes = &self.volumes;
         if fresh {
@@ -77,53 +94,101 @@ impl Lists {
     }
 
     /// Every pair of boxes that meet, each once.
-    pub(super) fn pairs<V: PairVisitor>(&self, boxes: &[Aabb], visitor: &mut V) {
-        for volume in 0..self.volumes.len() {
-            self.sweep_one(&self.ends[self.range(volume)], boxes, visitor);
-        }
+    pub(super) fn pairs<V: PairVisitor>(&self, visitor: &mut V) {
+        let mut volumes = Vec::new();
         self.tree.own_pairs(&mut |a: u32, b: u32| {
-            let lists = [a, b].map(|volume| &self.ends[self.range(volume as usize)]);
-            let around = [a, b].map(|volume| &self.volumes[volume as usize]);
-            self.sweep_two(lists, around, boxes, visitor);
+            volumes.push([a, b]);
             ControlFlow::Continue(())
         });
+        dispatch(SimdLevel::best(), Sweep { lists: self, volumes: &volumes, visitor });
+    }
+}
+
+struct Sweep<'a, V> {
+    lists: &'a Lists,
+    /// Pairs of volumes that meet.
+    volumes: &'a [[u32; 2]],
+    visitor: &'a mut V,
+}
+
+impl<V: PairVisitor> Task for Sweep<'_, V> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self) {
+        let Self { lists, volumes, visitor } = self;
+        for volume in 0..lists.volumes.len() {
+            lists.sweep_one::<S, V>(volume, visitor);
+        }
+        for &[a, b] in volumes {
+            lists.sweep_two::<S, V>(a as usize, b as usize, visitor);
+        }
+    }
+}
+
+impl Lists {
+    /// The numbers of a volume's blocks.
+    #[inline(always)]
+    fn range(&self, volume: usize) -> std::ops::Range<usize> {
+        volume * BLOCKS..((volume + 1) * BLOCKS).min(self.blocks.len())
     }
 
-    fn range(&self, volume: usize) -> Range<usize> {
-        volume * VOLUME..((volume + 1) * VOLUME).min(self.ends.len())
-    }
-
-    fn sweep_one<V: PairVisitor>(&self, list: &[End], boxes: &[Aabb], visitor: &mut V) {
-        for (at, a) in list.iter().enumerate() {
-            let aabb = &boxes[a.owner as usize];
-            for b in list[at + 1..].iter().take_while(|b| b.low <= aabb.max[self.axis]) {
-                if boxes_meet(aabb, &boxes[b.owner as usize]) {
-                    // The visitors of this module never break.
-                    let _ = visitor.pair(a.owner, b.owner);
+    #[inline(always)]
+    fn sweep_one<S: Simd, V: PairVisitor>(&self, volume: usize, visitor: &mut V) {
+        let range = self.range(volume);
+        for number in range.clone() {
+            let block = &self.blocks[number];
+            for row in 0..block.count as usize {
+                let aabb = block.get(row);
+                // Later places only: each pair once.
+                report(block, block.meets::<S>(&aabb) & (u32::MAX << row << 1), block.links[row], visitor);
+                for later in number + 1..range.end {
+                    if self.around[later].min[self.axis] > aabb.max[self.axis] {
+                        break;
+                    }
+                    let other = &self.blocks[later];
+                    report(other, other.meets::<S>(&aabb), block.links[row], visitor);
                 }
             }
         }
     }
 
-    /// The one whose lower end comes first is compared with what follows in the other list.
-    fn sweep_two<V: PairVisitor>(&self, one: [&[End]; 2], around: [&Aabb; 2], boxes: &[Aabb], visitor: &mut V) {
-        let mut next = [0, 0];
-        while next[0] < one[0].len() && next[1] < one[1].len() {
-            let first = usize::from(one[1][next[1]].low < one[0][next[0]].low);
-            let other = 1 - first;
-            let a = one[first][next[first]].owner;
-            next[first] += 1;
-            let aabb = &boxes[a as usize];
-            if !boxes_meet(aabb, around[other]) {
-                continue;
+    /// Boxes of the one that meet the other's volume are compared with the blocks that they meet.
+    #[inline(always)]
+    fn sweep_two<S: Simd, V: PairVisitor>(&self, a: usize, b: usize, visitor: &mut V) {
+        let axis = self.axis;
+        let volume = &self.volumes[b];
+        for one in self.range(a) {
+            if self.around[one].min[axis] > volume.max[axis] {
+                break;
             }
-            for b in one[other][next[other]..].iter().take_while(|b| b.low <= aabb.max[self.axis]) {
-                if boxes_meet(aabb, &boxes[b.owner as usize]) {
-                    // As above.
-                    let _ = visitor.pair(a, b.owner);
+            let block = &self.blocks[one];
+            let mut rows = block.meets::<S>(volume);
+            while rows != 0 {
+                let row = rows.trailing_zeros() as usize & 7;
+                rows &= rows - 1;
+                let aabb = block.get(row);
+                for other in self.range(b) {
+                    let around = &self.around[other];
+                    if around.min[axis] > aabb.max[axis] {
+                        break;
+                    }
+                    if around.max[axis] >= aabb.min[axis] {
+                        let other = &self.blocks[other];
+                        report(other, other.meets::<S>(&aabb), block.links[row], visitor);
+                    }
                 }
             }
         }
+    }
+}
+
+#[inline(always)]
+fn report<V: PairVisitor>(block: &Node, mut mask: u32, one: u32, visitor: &mut V) {
+    while mask != 0 {
+        // The visitors of this module never break.
+        let _ = visitor.pair(one, block.links[mask.trailing_zeros() as usize & 7]);
+        mask &= mask - 1;
     }
 }
 

@@ -61,6 +61,8 @@ pub struct BroadPhase {
     fat: Vec<Aabb>,
     /// Over `fat` as it was when the tree was last refitted or built.
     tree: Tree,
+    /// The tree is of an earlier frame than `fat`, since lists were used.
+    is_behind: bool,
     lists: Lists,
     /// Pairs of `fat` that meet, ascending.
     candidates: Vec<[u32; 2]>,
@@ -126,9 +128,10 @@ impl BroadPhase {
     fn find(&mut self, boxes: &[Aabb]) -> BroadMethod {
         if boxes.len() != self.fat.len() {
             self.lists.clear();
-            self.choice.forget();
             self.fatten(boxes, 0.0);
+            let began = Instant::now();
             self.collect(BroadMethod::Rebuild, boxes, false);
+            self.choice.begin(false, began.elapsed());
             return BroadMethod::Rebuild;
         }
         if self.stays(boxes) {
@@ -138,12 +141,13 @@ impl BroadPhase {
         let (motion, edge) = motion(&self.boxes, boxes);
         let margin = (FRAMES * motion).min(LARGEST_MARGIN * edge);
         let margin = if margin >= LEAST_FRAMES * motion && margin.is_finite() { margin } else { 0.0 };
-        let method = self.choice.next(motion);
+        // Where boxes stay for a while, a better tree pays.
+        let wild = margin <= 0.0;
+        let method = self.choice.next(motion, wild);
         self.fatten(boxes, margin);
         let began = Instant::now();
-        // Where boxes stay for a while, a better tree pays.
-        self.collect(method, boxes, margin <= 0.0);
-        self.choice.note(method, motion, began.elapsed());
+        self.collect(method, boxes, wild);
+        self.choice.note(method, wild, motion, began.elapsed());
         method
     }
 
@@ -170,6 +174,11 @@ impl BroadPhase {
     }
 
     fn look_up_strays(&mut self, boxes: &[Aabb]) {
+        if std::mem::take(&mut self.is_behind) {
+            // No box is loose yet: that would have been a stray.
+            let fat = &self.fat;
+            self.tree.refit(&|i: u32| fat[i as usize]);
+        }
         for &stray in &self.strays {
             let (old, new) = (self.boxes[stray as usize], boxes[stray as usize]);
             // As far as it came in this frame, each way.
@@ -230,11 +239,13 @@ impl BroadPhase {
         match method {
             BroadMethod::Rebuild if wild => self.tree.rebuild_by_curve(fat, &mut self.keys, &mut self.other_keys),
             BroadMethod::Rebuild => self.tree.rebuild(fat.len(), |i| fat[i as usize]),
+            BroadMethod::Resort => {}
             _ => self.tree.refit(&|i: u32| fat[i as usize]),
         }
+        self.is_behind = method == BroadMethod::Resort;
         if method == BroadMethod::Resort {
             self.lists.update(&self.tree, fat);
-            self.lists.pairs(fat, &mut push);
+            self.lists.pairs(&mut push);
         } else {
             self.tree.own_pairs(&mut push);
         }

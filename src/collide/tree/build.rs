@@ -14,11 +14,11 @@ use std::{ops::Range, sync::OnceLock};
 
 use glam::Vec3;
 
-use super::{BUILDS, LEAF, NONE, Node, Ordering, Tree, WIDTH, cleaned};
-use crate::geom::Aabb;
-
-/// Bins of a cut.
-const BINS: usize = 12;
+use super::{BUILDS, Ends, LEAF, NONE, Node, Ordering, Tree, WIDTH};
+use crate::{
+    geom::Aabb,
+    world::{BINS, cheapest_border},
+};
 
 /// Runs up to this long are cut at multiples of [`WIDTH`].
 const ALIGNED: usize = 512;
@@ -65,31 +65,14 @@ impl Tree {
         self.bounds.clear();
         self.labels = OnceLock::new();
         self.build = BUILDS.fetch_add(1, Ordering::Relaxed);
-        let mut items: Vec<Item> = (0..count as u32).map(|id| Item { aabb: cleaned(boxes(id)), id }).collect();
+        let mut items: Vec<Item> =
+            (0..count as u32).map(|id| Item { aabb: Ends::new(&boxes(id)).aabb(), id }).collect();
         if count > 0 {
             self.emit(&mut items, 0);
         }
-        self.bounds.resize(self.nodes.len(), Aabb::EMPTY);
-        // Items in tree order: refit reads them again.
-        let own: f64 = items.iter().map(|i| f64::from(i.aabb.half_area())).sum();
-        self.refit_inner();
-        let areas: f64 = self.bounds.iter().map(|b| f64::from(b.half_area())).sum();
-        self.now = if own > 0.0 { areas / own } else { 0.0 };
+        self.bounds.resize(self.nodes.len(), Ends::EMPTY);
+        self.refit(&boxes);
         self.fresh = self.now;
-    }
-
-    /// The boxes of all nodes from those of the leaves' items.
-    fn refit_inner(&mut self) {
-        for number in (0..self.nodes.len()).rev() {
-            let node = &mut self.nodes[number];
-            if !node.is_leaf {
-                for lane in 0..node.count as usize {
-                    let child = self.bounds[(node.links[lane] & !LEAF) as usize];
-                    node.put(lane, &child);
-                }
-            }
-            self.bounds[number] = node.bounds();
-        }
     }
 
     /// Emits the subtree over `items`; its link.
@@ -98,9 +81,8 @@ impl Tree {
         if items.len() <= WIDTH {
             let mut leaf = Node::new(true);
             leaf.count = items.len() as u32;
-            for (lane, item) in items.iter().enumerate() {
-                leaf.put(lane, &item.aabb);
-                leaf.links[lane] = item.id;
+            for (link, item) in leaf.links.iter_mut().zip(&*items) {
+                *link = item.id;
             }
             self.nodes.push(leaf);
             return number as u32 | LEAF;
@@ -178,7 +160,7 @@ fn cut(items: &mut [Item], piece: &Piece, depth: usize) -> usize {
         return select(items, axis, aligned(count / 2));
     }
     let bin = |item: &Item| (((item.center()[axis] - low) * scale) as usize).min(BINS - 1);
-    let border = cheapest_border(items, bin);
+    let border = cheapest_border(items.iter().map(|item| (bin(item), item.aabb)), WIDTH);
     if count > ALIGNED {
         let middle = partition(items, |item| bin(item) < border);
         if middle > 0 && middle < count {
@@ -208,33 +190,4 @@ fn partition(items: &mut [Item], first: impl Fn(&Item) -> bool) -> usize {
         }
     }
     low
-}
-
-/// The bin that the second half begins with: least area times leaves, earliest first.
-#[inline(always)]
-fn cheapest_border(items: &[Item], bin: impl Fn(&Item) -> usize) -> usize {
-    let mut bins = [(Aabb::EMPTY, 0_usize); BINS];
-    for item in items {
-        let (aabb, count) = &mut bins[bin(item)];
-        *aabb = aabb.union(item.aabb);
-        *count += 1;
-    }
-    let weigh = |(aabb, count): (Aabb, usize)| f64::from(aabb.half_area()) * count.div_ceil(WIDTH) as f64;
-    let join = |a: (Aabb, usize), b: (Aabb, usize)| (a.0.union(b.0), a.1 + b.1);
-    let mut right = [0.0; BINS];
-    let mut sum = (Aabb::EMPTY, 0);
-    for at in (1..BINS).rev() {
-        sum = join(sum, bins[at]);
-        right[at] = weigh(sum);
-    }
-    let mut best = (f64::INFINITY, BINS / 2);
-    let mut left = (Aabb::EMPTY, 0);
-    for at in 1..BINS {
-        left = join(left, bins[at - 1]);
-        let cost = weigh(left) + right[at];
-        if cost < best.0 {
-            best = (cost, at);
-        }
-    }
-    best.1
 }

@@ -15,7 +15,7 @@ use std::sync::OnceLock;
 
 use glam::Vec3;
 
-use super::{BUILDS, LEAF, Node, Ordering, Tree, WIDTH, build::MAX_ITEMS, cleaned};
+use super::{BUILDS, Ends, LEAF, Node, Ordering, Tree, WIDTH, build::MAX_ITEMS};
 use crate::geom::Aabb;
 
 /// Cells along an axis.
@@ -38,7 +38,7 @@ impl Tree {
         }
         sort_along_curve(boxes, keys, other);
         self.lay_out(boxes, keys);
-        self.bounds.resize(self.nodes.len(), Aabb::EMPTY);
+        self.bounds.resize(self.nodes.len(), Ends::EMPTY);
         let all = |i: u32| boxes[i as usize];
         self.refit(&all);
         self.fresh = self.now;
@@ -112,7 +112,7 @@ fn sort_along_curve(boxes: &[Aabb], keys: &mut Vec<u64>, other: &mut Vec<u64>) {
 /// Midpoint, halved first: the sum may overflow. NaN for what has none.
 #[inline(always)]
 fn center(aabb: &Aabb) -> Vec3 {
-    let Aabb { min, max } = cleaned(*aabb);
+    let Aabb { min, max } = Ends::new(aabb).aabb();
     min * 0.5 + max * 0.5
 }
 

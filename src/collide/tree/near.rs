@@ -2,10 +2,10 @@
 
 use glam::Vec3;
 
-use super::{LEAF, Tree, WIDTH};
+use super::{LEAF, Node, Tree, WIDTH};
 use crate::{
     geom::Aabb,
-    simd::{Lanes, Simd},
+    simd::{LEAST_KEY, Lanes, Simd, key_floor},
 };
 
 /// Looks at items near a point, nearer ones first as a rule.
@@ -25,40 +25,33 @@ const FLOOR: f64 = 1e-36;
 impl Tree {
     /// Shows `near` every item whose box comes as near to `point` (finite) as the limit, and some others.
     #[inline(always)]
-    pub(in crate::collide) fn near<S: Simd, N: Near>(&self, point: Vec3, stack: &mut Vec<(f32, u32)>, near: &mut N) {
+    pub(in crate::collide) fn near<S: Simd, N: Near>(&self, point: Vec3, stack: &mut Vec<[u32; 2]>, near: &mut N) {
         stack.clear();
         if !self.nodes.is_empty() {
-            stack.push((0.0, 0));
+            stack.push([LEAST_KEY, 0]);
         }
-        while let Some((distance, link)) = stack.pop() {
-            if distance > limit(near) {
+        let point = [S::F8::splat(point.x), S::F8::splat(point.y), S::F8::splat(point.z)];
+        while let Some([key, link]) = stack.pop() {
+            let most = limit(near);
+            if key_floor(key) > most {
                 continue;
             }
             let node = &self.nodes[(link & !LEAF) as usize];
-            let mut squares = [0.0; WIDTH];
-            let mut mask = node.squares::<S>(point, limit(near), &mut squares);
-            let mut order = [(0.0_f32, 0_u32); WIDTH];
-            let mut found = 0;
-            while mask != 0 {
-                let lane = mask.trailing_zeros() as usize & (WIDTH - 1);
-                mask &= mask - 1;
-                // Furthest first.
-                let mut at = found;
-                while at > 0 && order[at - 1].0 < squares[lane] {
-                    order[at] = order[at - 1];
-                    at -= 1;
-                }
-                order[at] = (squares[lane], node.links[lane]);
-                found += 1;
-            }
+            let squares = node.squares::<S>(&point);
+            let mask = squares.le(S::F8::splat(most)) & ((1 << node.count) - 1);
+            let (mut keys, mut links) = ([0; WIDTH], [0; WIDTH]);
+            S::descending(squares, mask, &node.links, &mut keys, &mut links);
+            let found = mask.count_ones() as usize;
             if node.is_leaf {
-                for &(square, item) in order[..found].iter().rev() {
-                    if square <= limit(near) {
-                        near.visit(item);
+                for at in (0..found).rev() {
+                    if key_floor(keys[at & 7]) <= limit(near) {
+                        near.visit(links[at & 7]);
                     }
                 }
             } else {
-                stack.extend_from_slice(&order[..found]);
+                for at in 0..found {
+                    stack.push([keys[at & 7], links[at & 7]]);
+                }
             }
         }
     }
@@ -71,20 +64,17 @@ fn limit<N: Near>(near: &N) -> f32 {
     ((near.limit() + FLOOR) as f32).next_up()
 }
 
-impl super::Node {
-    /// Squared distances of a point to the boxes, not above the true ones but for underflow; infinite for empty boxes. Places within a limit.
+impl Node {
+    /// Squared distances of a point to the boxes, not above the true ones but for underflow; infinite for empty boxes.
     #[inline(always)]
-    fn squares<S: Simd>(&self, point: Vec3, most: f32, out: &mut [f32; WIDTH]) -> u32 {
+    fn squares<S: Simd>(&self, point: &[S::F8; 3]) -> S::F8 {
         let mut sum = S::F8::splat(0.0);
-        for axis in 0..3 {
-            let p = S::F8::splat(point[axis]);
-            let outside = (S::F8::load(&self.min[axis]) - p).max(p - S::F8::load(&self.max[axis]));
+        for ((p, min), max) in point.iter().zip(&self.min).zip(&self.max) {
+            let outside = (S::F8::load(min) - *p).max(*p - S::F8::load(max));
             let d = outside.max(S::F8::splat(0.0));
             sum = sum + d * d;
         }
-        let squares = sum * S::F8::splat(BELOW);
-        squares.store(out);
-        squares.le(S::F8::splat(most)) & ((1 << self.count) - 1)
+        sum * S::F8::splat(BELOW)
     }
 }
 

@@ -58,12 +58,13 @@ impl Tree {
     }
 }
 
-/// Three labels of each item of a leaf, as floats: comparisons of those are at hand, and numbers of one size and sign differ as their bits do.
+/// Three labels of each item of a leaf, as floats of that order: wide arithmetic on those is at hand.
 #[derive(Clone, Debug)]
 pub(super) struct Labels([[f32; WIDTH]; 3]);
 
-/// Added to labels, so that they are the bits of normal floats.
-const NORMAL: u32 = 1 << 29;
+/// Added to labels below 2^28, so that they are the bits of floats from 2^-16 to 2^16. Those that differ do so by 2^-39 at least, and a product
+/// of three differences is a normal number: it is 0 where one of them is, and nowhere else.
+const NORMAL: u32 = (127 - 16) << 23;
 
 impl Labels {
     fn new(node: &Node, labels: &[[u32; 3]]) -> Self {
@@ -81,15 +82,15 @@ impl Labels {
     /// Places whose items have a label in common with that at a place of another leaf.
     #[inline(always)]
     fn shared<S: Simd>(&self, other: &Self, row: usize) -> u32 {
-        let mut mask = 0;
-        for own in &self.0 {
-            let own = S::F8::load(own);
-            for labels in &other.0 {
-                let label = S::F8::splat(labels[row]);
-                mask |= own.le(label) & label.le(own);
-            }
+        let mut least = S::F8::splat(f32::INFINITY);
+        for labels in &other.0 {
+            let label = S::F8::splat(labels[row]);
+            let mut product = S::F8::load(&self.0[0]) - label;
+            product = product * (S::F8::load(&self.0[1]) - label);
+            product = product * (S::F8::load(&self.0[2]) - label);
+            least = least.min(product.abs());
         }
-        mask
+        least.le(S::F8::splat(0.0))
     }
 }
 
@@ -124,14 +125,14 @@ fn walk<S: Simd, V: PairVisitor>(
         let (one, other) = (a.node(of_a), b.node(of_b));
         // A leaf waits until the other is one too.
         if one.is_leaf && !other.is_leaf {
-            let mut mask = other.meets::<S>(&a.bounds[(of_a & !LEAF) as usize]);
+            let mut mask = other.meets::<S>(&a.bounds[(of_a & !LEAF) as usize].aabb());
             while mask != 0 {
                 stack.push((of_a, other.links[mask.trailing_zeros() as usize]));
                 mask &= mask - 1;
             }
             continue;
         }
-        let mut rows = one.meets::<S>(&b.bounds[(of_b & !LEAF) as usize]);
+        let mut rows = one.meets::<S>(&b.bounds[(of_b & !LEAF) as usize].aabb());
         while rows != 0 {
             let row = rows.trailing_zeros() as usize & 7;
             rows &= rows - 1;

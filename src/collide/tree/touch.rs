@@ -56,7 +56,7 @@ impl Tree {
             let open_first = !one.is_leaf && (two.is_leaf || self.bounds[a].half_area() >= other.bounds[b].half_area());
             if open_first {
                 for lane in 0..one.count as usize {
-                    let square = square_between(&one.get(lane), &other.bounds[b]);
+                    let square = square_between(&one.get(lane), &other.bounds[b].aabb());
                     if square <= near.limit() {
                         heap.push(Waiting { square, links: (one.links[lane], links.1) });
                     }
@@ -66,7 +66,7 @@ impl Tree {
             for lane in 0..two.count as usize {
                 let aabb = two.get(lane);
                 if !one.is_leaf || !two.is_leaf {
-                    let square = square_between(&self.bounds[a], &aabb);
+                    let square = square_between(&self.bounds[a].aabb(), &aabb);
                     if square <= near.limit() {
                         heap.push(Waiting { square, links: (links.0, two.links[lane]) });
                     }

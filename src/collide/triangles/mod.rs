@@ -110,10 +110,12 @@ impl Found {
     }
 }
 
+#[inline(always)]
 fn sides(plane: &Plane, corners: &[Vec3; 3]) -> [Sign; 3] {
     [plane.side(corners[0]), plane.side(corners[1]), plane.side(corners[2])]
 }
 
+#[inline(always)]
 fn parted(sides: [Sign; 3]) -> bool {
     sides == [1; 3] || sides == [-1; 3]
 }
@@ -137,6 +139,7 @@ struct Stance {
 }
 
 impl Stance {
+    #[inline(always)]
     fn new(a: &[Vec3; 3], b: &[Vec3; 3]) -> Option<Self> {
         if !a.iter().chain(b).all(|c| c.is_finite()) {
             return None;

@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, OnceLock};
 
-use glam::{DAffine3, Vec3};
+use glam::{DAffine3, Vec3, Vec4};
 
 use super::{
     CollideError, ObjectId, PartId,
@@ -205,20 +205,10 @@ impl Part {
             Some((vertices, transform)) => place(vertices, transform, out),
             None => deform_parallel(SimdLevel::best(), &object.scene, &object.pose, instance, out),
         }
-        // NaN is lost in a minimum, so all sizes are compared as well.
-        let mut reach = Vec3::ZERO;
-        let mut whole = true;
-        for p in out.iter() {
-            reach = reach.max(p.abs());
-            whole &= p.is_finite();
-        }
-        if !whole || reach.max_element() >= f32::MAX {
+        let Some(around) = around(out) else {
             return Err(CollideError::BeyondF32 { object: ObjectId(narrow(self.object)), part: self.id });
-        }
-        self.bounds = self.shape.triangles().iter().fold(Aabb::EMPTY, |all, corners| {
-            let [a, b, c] = corners.map(|i| out[i as usize]);
-            Aabb { min: all.min.min(a).min(b).min(c), max: all.max.max(a).max(b).max(c) }
-        });
+        };
+        self.bounds = self.shape.bounds(out, around);
         self.position_pool.keep(next.clone());
         self.positions = next;
         Ok(())
@@ -304,4 +294,17 @@ fn place(vertices: &[Vec3], world_from_mesh: &DAffine3, out: &mut [Vec3]) {
         let p = world_from_mesh.transform_point3(from.as_dvec3());
         *to = Vec3::new(rounded(p.x), rounded(p.y), rounded(p.z));
     }
+}
+
+/// The least box around points, empty without any; `None` where one is NaN or lies at the end of f32 or beyond.
+fn around(points: &[Vec3]) -> Option<Aabb> {
+    let (mut low, mut high) = (Vec4::INFINITY, Vec4::NEG_INFINITY);
+    // NaN is lost in a minimum, so all sizes are compared as well.
+    let mut sound = Vec4::ZERO.cmpeq(Vec4::ZERO);
+    for p in points {
+        let p = p.extend(0.0);
+        (low, high) = (low.min(p), high.max(p));
+        sound &= p.abs().cmplt(Vec4::MAX);
+    }
+    sound.all().then(|| Aabb { min: low.truncate(), max: high.truncate() })
 }

@@ -8,7 +8,7 @@ use std::{
 use glam::Vec3;
 
 use crate::{
-    geom::{InstanceId, PrimId},
+    geom::{Aabb, InstanceId, PrimId},
     scene::MeshPart,
     world::GroupLayout,
 };
@@ -23,6 +23,8 @@ pub(in crate::collide) struct PartShape {
     pub(in crate::collide) layout: Arc<GroupLayout>,
     /// Vertices in the rest pose.
     rest: Vec<Vec3>,
+    /// Whether every vertex is a corner of a triangle.
+    all_used: bool,
     first_there: OnceLock<Vec<u32>>,
     welded: OnceLock<Vec<[u32; 3]>>,
     owned: OnceLock<Vec<u8>>,
@@ -41,6 +43,7 @@ impl PartShape {
         Self {
             layout: Arc::new(layout),
             rest: part.positions.clone(),
+            all_used: all_used(part),
             first_there: OnceLock::new(),
             welded: OnceLock::new(),
             owned: OnceLock::new(),
@@ -129,6 +132,13 @@ impl PartShape {
         self.layout.indices.len()
     }
 
+    /// The least box around all triangles, of that around all vertices; without negative zeros.
+    pub(in crate::collide) fn bounds(&self, positions: &[Vec3], of_vertices: Aabb) -> Aabb {
+        let corners = || self.triangles().iter().flatten().map(|&i| positions[i as usize]);
+        let all = if self.all_used { of_vertices } else { Aabb::from_points(corners()) };
+        Aabb { min: all.min + Vec3::ZERO, max: all.max + Vec3::ZERO }
+    }
+
     /// Corners of a triangle.
     #[inline(always)]
     pub(in crate::collide) fn corners(&self, positions: &[Vec3], triangle: PrimId) -> [Vec3; 3] {
@@ -136,4 +146,10 @@ impl PartShape {
         let [a, b, c] = self.layout.indices[triangle.0 as usize];
         [positions[a as usize], positions[b as usize], positions[c as usize]]
     }
+}
+
+fn all_used(part: &MeshPart) -> bool {
+    let mut used = vec![false; part.positions.len()];
+    part.triangles.iter().flatten().for_each(|&i| used[i as usize] = true);
+    used.into_iter().all(|used| used)
 }
