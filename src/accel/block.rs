@@ -42,7 +42,7 @@ pub(super) struct BlockBounds {
 }
 
 impl TriBlock {
-    /// A block of up to four triangles whose corners are still to be set by [`TriBlock::refit`].
+    /// A block of up to four triangles, from the first lane on, whose corners are still to be set by [`TriBlock::refit`].
     pub(super) fn new(prims: [u32; 4]) -> Self {
         Self { corners: [[[0.0; 4]; 3]; 3], prims }
     }
@@ -115,6 +115,53 @@ impl TriBlock {
     /// Takes the corners from `prims` and returns the box around them.
     #[inline(always)]
     pub(super) fn refit(&mut self, prims: &Triangles<'_>) -> BlockBounds {
+        let first = self.prims[0];
+        let mut vertices = [[0; 3]; 4];
+        for (vertices, &prim) in vertices.iter_mut().zip(&self.prims) {
+            *vertices = prims.indices[if prim == NO_PRIM { first } else { prim } as usize];
+        }
+        let mut rows = [[Vec4::ZERO; 3]; 3];
+        let mut zero = Vec4::ZERO;
+        for (corner, rows) in rows.iter_mut().enumerate() {
+            let [a, b, c, d] = &vertices;
+            *rows = transposed([
+                extended(prims.positions, a[corner] as usize),
+                extended(prims.positions, b[corner] as usize),
+                extended(prims.positions, c[corner] as usize),
+                extended(prims.positions, d[corner] as usize),
+            ]);
+            // A product with 0 is 0 unless the factor is infinite or NaN.
+            zero += rows[0] * 0.0 + rows[1] * 0.0 + rows[2] * 0.0;
+        }
+        if zero != Vec4::ZERO {
+            return self.refit_odd(prims);
+        }
+        let [a, b, c] = &rows;
+        let (mut low, mut high) = ([Vec4::ZERO; 3], [Vec4::ZERO; 3]);
+        for axis in 0..3 {
+            low[axis] = a[axis].min(b[axis]).min(c[axis]);
+            high[axis] = a[axis].max(b[axis]).max(c[axis]);
+        }
+        let e = [high[0] - low[0], high[1] - low[1], high[2] - low[2]];
+        let areas = (e[0] * e[1] + e[1] * e[2] + e[2] * e[0]).to_array();
+        let mut own_area = 0.0;
+        for (area, &prim) in areas.into_iter().zip(&self.prims) {
+            own_area += if prim == NO_PRIM { 0.0 } else { f64::from(area) };
+        }
+        for (corner, rows) in self.corners.iter_mut().zip(rows) {
+            *corner = [rows[0].to_array(), rows[1].to_array(), rows[2].to_array()];
+        }
+        let least = Mat4::from_cols(low[0], low[1], low[2], low[2]).transpose();
+        let most = Mat4::from_cols(high[0], high[1], high[2], high[2]).transpose();
+        let min = least.x_axis.min(least.y_axis).min(least.z_axis.min(least.w_axis));
+        let max = most.x_axis.max(most.y_axis).max(most.z_axis.max(most.w_axis));
+        BlockBounds { aabb: Aabb { min: min.truncate(), max: max.truncate() }, own_area }
+    }
+
+    /// As [`TriBlock::refit`], where a corner is not finite.
+    #[cold]
+    #[inline(never)]
+    fn refit_odd(&mut self, prims: &Triangles<'_>) -> BlockBounds {
         let mut min = Vec3A::INFINITY;
         let mut max = Vec3A::NEG_INFINITY;
         let mut own_area = 0.0;
@@ -403,6 +450,23 @@ impl<const N: usize> Spilled<N> {
         let quotients = Quotients { inv_det, u, v, det_error, uv_error };
         TriangleHit { corners: block.corners(triangle), t_low, t_high, quotients }
     }
+}
+
+/// A vertex, with any number in the fourth place: one load where that is another vertex's.
+#[inline(always)]
+fn extended(positions: &[Vec3], vertex: usize) -> Vec4 {
+    let numbers: &[f32] = bytemuck::cast_slice(positions);
+    match numbers.get(3 * vertex..3 * vertex + 4) {
+        Some(four) => Vec4::from_slice(four),
+        None => positions[vertex].extend(0.0),
+    }
+}
+
+/// The first three rows of a matrix whose columns these are.
+#[inline(always)]
+fn transposed([a, b, c, d]: [Vec4; 4]) -> [Vec4; 3] {
+    let rows = Mat4::from_cols(a, b, c, d).transpose();
+    [rows.x_axis, rows.y_axis, rows.z_axis]
 }
 
 type D3<S> = [<S as Simd>::D4; 3];

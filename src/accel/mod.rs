@@ -6,6 +6,7 @@ mod boxes;
 pub mod bvh2;
 pub mod bvh8;
 mod counter;
+mod eight;
 pub mod events;
 mod fast;
 pub mod grid;
@@ -28,11 +29,12 @@ mod wide;
 
 pub use boxes::Visitor;
 pub use counter::ReadCounter;
+pub(crate) use eight::{EIGHT, Eight, EightPacket, EightRay, LEAF, ManyVisit, OneVisit, walk_many, walk_one};
 pub use packet::PACKET;
 pub(crate) use packet::PacketBoxes;
 pub use query::{AnyHit, Closest, HitSink, TravRay};
 pub use registry::{AccelKind, AccelSpec, AnyAccel, SpecError};
-pub(crate) use rigid::{RigidPlace, RigidTree};
+pub(crate) use rigid::{RigidPacket, RigidPlace, RigidTree};
 pub use topology::Cut;
 
 pub use crate::geom::{Forms, Precision};

@@ -1,4 +1,4 @@
-use glam::Vec3;
+use glam::{Vec3, Vec3A};
 
 use super::{Aabb, PrimId};
 
@@ -45,9 +45,10 @@ impl Triangles<'_> {
     /// The least box around a triangle, empty when a corner is not finite: such triangles are never hit.
     #[inline(always)]
     pub fn finite_aabb(&self, prim: PrimId) -> Aabb {
-        let [a, b, c] = self.corners(prim);
-        if a.is_finite() && b.is_finite() && c.is_finite() {
-            Aabb { min: a.min(b).min(c), max: a.max(b).max(c) }
+        let [a, b, c] = self.corners(prim).map(Vec3A::from);
+        // A product with 0 is 0 unless the factor is infinite or NaN.
+        if (a * 0.0 + b * 0.0) + c * 0.0 == Vec3A::ZERO {
+            Aabb { min: a.min(b).min(c).into(), max: a.max(b).max(c).into() }
         } else {
             Aabb::EMPTY
         }

@@ -2,13 +2,14 @@
 
 use super::{
     GroupFrame, World,
+    query::{AnyGroup, NearestGroup},
     sink::{GroupSink, Unfiltered},
     top::FLAT,
 };
 use crate::{
-    accel::{Closest, PACKET, PacketBoxes, TravRay},
+    accel::{Closest, EightPacket, LEAF, ManyVisit, PACKET, PacketBoxes, RigidPacket, TravRay, walk_many, walk_one},
     geom::{Forms, Hit, Ray},
-    simd::Simd,
+    simd::{Lanes, Simd},
 };
 
 /// The rays of a packet that can hit anything.
@@ -80,13 +81,10 @@ impl World {
                 }
             }
         } else {
-            for i in 0..packet.len {
-                if (packet.active >> i) & 1 == 1 {
-                    let mut walk = self.top.walk(&self.groups, &packet.rays[i]);
-                    while let Some(group) = walk.next(best[i].t_high()) {
-                        group.closest_packet::<S>(&packet.rays[i..=i], 1, &mut best[i..=i]);
-                    }
-                }
+            for start in (0..packet.len).step_by(S::F::LEN) {
+                let end = packet.len.min(start + S::F::LEN);
+                let active = packet.active >> start & S::F::ALL;
+                self.nearest_of_many::<S>(&packet.rays[start..end], active, &mut best[start..end]);
             }
         }
         for i in 0..packet.len {
@@ -114,53 +112,286 @@ impl World {
             }
             return blocked;
         }
-        for i in 0..packet.len {
-            if (packet.active >> i) & 1 == 1 {
-                let mut walk = self.top.walk(&self.groups, &packet.rays[i]);
-                let t_far = f64::from(packet.rays[i].range().t_far);
-                while let Some(group) = walk.next(t_far) {
-                    if group.occluded_packet::<S>(&packet.rays[i..=i], 1) != 0 {
-                        blocked |= 1 << i;
-                        break;
-                    }
-                }
-            }
+        for start in (0..packet.len).step_by(S::F::LEN) {
+            let end = packet.len.min(start + S::F::LEN);
+            let active = packet.active >> start & S::F::ALL;
+            blocked |= self.blocked_of_many::<S>(&packet.rays[start..end], active) << start;
         }
         blocked
     }
-}
 
-impl GroupFrame {
+    /// Those of the rays in `active`, a vector of them or fewer, over more than [`FLAT`] groups.
     #[inline(always)]
-    fn closest_packet<S: Simd>(&self, rays: &[TravRay], active: u32, best: &mut [Closest]) {
-        let prims = self.triangles();
-        if let Some((tree, place)) = &self.rigid {
-            let sink = GroupSink { layout: &self.layout, filter: Unfiltered };
-            for (i, ray) in rays.iter().enumerate() {
-                if (active >> i) & 1 == 1 {
-                    tree.closest::<S, _>(place, &prims, ray, &mut best[i], &sink);
-                }
+    fn nearest_of_many<S: Simd>(&self, rays: &[TravRay], active: u32, best: &mut [Closest]) {
+        let mut single = active;
+        let nodes = self.top.wide();
+        if active.count_ones() > FEW && !nodes.is_empty() {
+            let lines = lines::<S>(rays, self.top.reach());
+            single &= !lines.fits();
+            let mut limits = [0.0; PACKET];
+            for (limit, best) in limits.iter_mut().zip(&*best) {
+                *limit = best.t_cull();
             }
-            return;
+            let mut visit = NearestGroups { world: self, rays, best, limits, packet: None };
+            walk_many(nodes, &lines, active & lines.fits(), &mut visit);
         }
-        let sinks = [GroupSink { layout: &self.layout, filter: Unfiltered }; PACKET];
-        self.accel.closest_packet::<S, (), _>(&prims, rays, active, best, &sinks[..rays.len()], &mut ());
+        for i in bits(single) {
+            self.nearest_of_one::<S>(&rays[i], &mut best[i]);
+        }
     }
 
     #[inline(always)]
-    fn occluded_packet<S: Simd>(&self, rays: &[TravRay], active: u32) -> u32 {
-        let prims = self.triangles();
-        if let Some((tree, place)) = &self.rigid {
-            let sink = GroupSink { layout: &self.layout, filter: Unfiltered };
-            let mut blocked = 0;
-            for (i, ray) in rays.iter().enumerate() {
-                if (active >> i) & 1 == 1 {
-                    blocked |= u32::from(tree.occluded::<S, _>(place, &prims, ray, &sink)) << i;
-                }
-            }
-            return blocked;
+    fn nearest_of_one<S: Simd>(&self, ray: &TravRay, best: &mut Closest) {
+        if let Some(line) = self.top.line::<S>(ray) {
+            let mut visit = NearestGroup { groups: &self.groups, ray, best, filter: Unfiltered };
+            walk_one::<S, _>(self.top.wide(), &line, 0, &mut visit);
+            return;
         }
+        let mut walk = self.top.walk(&self.groups, ray);
+        while let Some(group) = walk.next(best.t_high()) {
+            group.closest::<S, _>(ray, best, Unfiltered);
+        }
+    }
+
+    /// As [`World::nearest_of_many`]: the bits of those that are blocked.
+    #[inline(always)]
+    fn blocked_of_many<S: Simd>(&self, rays: &[TravRay], active: u32) -> u32 {
+        let (mut single, mut blocked) = (active, 0);
+        let nodes = self.top.wide();
+        if active.count_ones() > FEW && !nodes.is_empty() {
+            let lines = lines::<S>(rays, self.top.reach());
+            single &= !lines.fits();
+            let mut limits = [0.0; PACKET];
+            for (limit, ray) in limits.iter_mut().zip(rays) {
+                *limit = ray.range().t_far;
+            }
+            let together = active & lines.fits();
+            let mut visit = AnyGroups { world: self, rays, open: together, limits, packet: None };
+            walk_many(nodes, &lines, together, &mut visit);
+            blocked = together & !visit.open;
+        }
+        for i in bits(single) {
+            blocked |= u32::from(self.is_one_blocked::<S>(&rays[i])) << i;
+        }
+        blocked
+    }
+
+    #[inline(always)]
+    fn is_one_blocked<S: Simd>(&self, ray: &TravRay) -> bool {
+        if let Some(line) = self.top.line::<S>(ray) {
+            let mut visit = AnyGroup { groups: &self.groups, ray, filter: Unfiltered, is_blocked: false };
+            walk_one::<S, _>(self.top.wide(), &line, 0, &mut visit);
+            return visit.is_blocked;
+        }
+        let mut walk = self.top.walk(&self.groups, ray);
+        let t_far = f64::from(ray.range().t_far);
+        while let Some(group) = walk.next(t_far) {
+            if group.occluded::<S, _>(ray, Unfiltered) {
+                return true;
+            }
+        }
+        false
+    }
+}
+
+/// Up to this many rays go one by one.
+const FEW: u32 = 2;
+
+/// Rays of a packet against boxes within `reach` of 0.
+#[inline(always)]
+fn lines<S: Simd>(rays: &[TravRay], reach: f32) -> EightPacket<S> {
+    let (mut from, mut dir, mut near) = ([[0.0; PACKET]; 3], [[0.0; PACKET]; 3], [0.0; PACKET]);
+    for (lane, near) in near.iter_mut().enumerate() {
+        let range = rays[lane.min(rays.len() - 1)].range();
+        for axis in 0..3 {
+            from[axis][lane] = range.origin[axis];
+            dir[axis][lane] = range.dir[axis];
+        }
+        *near = range.t_near;
+    }
+    EightPacket::new(
+        [S::F::load(&from[0]), S::F::load(&from[1]), S::F::load(&from[2])],
+        [S::F::load(&dir[0]), S::F::load(&dir[1]), S::F::load(&dir[2])],
+        [0.0; 3],
+        reach,
+        S::F::load(&near),
+    )
+}
+
+/// Offers the triangles of groups to the rays of a packet.
+struct NearestGroups<'a> {
+    world: &'a World,
+    rays: &'a [TravRay],
+    best: &'a mut [Closest],
+    limits: [f32; PACKET],
+    /// For rigid groups, once there is one.
+    packet: Option<RigidPacket>,
+}
+
+impl<S: Simd> ManyVisit<S> for NearestGroups<'_> {
+    #[inline(always)]
+    fn open(&self) -> u32 {
+        u32::MAX
+    }
+
+    #[inline(always)]
+    fn limit(&self) -> S::F {
+        S::F::load(&self.limits)
+    }
+
+    #[inline(always)]
+    fn leaf(&mut self, word: u32, mask: u32) {
+        let group = &self.world.groups[(word & !LEAF) as usize];
+        group.closest_of_vector::<S>(self.rays, mask, self.best, &mut self.packet, self.world.top.reach());
+        for i in bits(mask) {
+            self.limits[i & (PACKET - 1)] = self.best[i].t_cull();
+        }
+    }
+
+    #[inline(always)]
+    fn few(&mut self, word: u32, mask: u32) -> bool {
+        if mask.count_ones() > FEW {
+            return false;
+        }
+        for i in bits(mask) {
+            // The packet's rays fit as those of its lanes do.
+            let Some(line) = self.world.top.line::<S>(&self.rays[i]) else { return false };
+            let (ray, best) = (&self.rays[i], &mut self.best[i]);
+            let mut visit = NearestGroup { groups: &self.world.groups, ray, best, filter: Unfiltered };
+            walk_one::<S, _>(self.world.top.wide(), &line, word, &mut visit);
+            self.limits[i & (PACKET - 1)] = self.best[i].t_cull();
+        }
+        true
+    }
+}
+
+/// Asks groups which rays of a packet they block.
+struct AnyGroups<'a> {
+    world: &'a World,
+    rays: &'a [TravRay],
+    open: u32,
+    limits: [f32; PACKET],
+    packet: Option<RigidPacket>,
+}
+
+impl<S: Simd> ManyVisit<S> for AnyGroups<'_> {
+    #[inline(always)]
+    fn open(&self) -> u32 {
+        self.open
+    }
+
+    #[inline(always)]
+    fn limit(&self) -> S::F {
+        S::F::load(&self.limits)
+    }
+
+    #[inline(always)]
+    fn leaf(&mut self, word: u32, mask: u32) {
+        let group = &self.world.groups[(word & !LEAF) as usize];
+        let reach = self.world.top.reach();
+        self.open &= !group.occluded_of_vector::<S>(self.rays, mask, &mut self.packet, reach);
+    }
+
+    #[inline(always)]
+    fn few(&mut self, word: u32, mask: u32) -> bool {
+        if mask.count_ones() > FEW {
+            return false;
+        }
+        for i in bits(mask) {
+            let ray = &self.rays[i];
+            let Some(line) = self.world.top.line::<S>(ray) else { return false };
+            let mut visit = AnyGroup { groups: &self.world.groups, ray, filter: Unfiltered, is_blocked: false };
+            walk_one::<S, _>(self.world.top.wide(), &line, word, &mut visit);
+            self.open &= !(u32::from(visit.is_blocked) << i);
+        }
+        true
+    }
+}
+
+/// Numbers of the set bits.
+#[inline(always)]
+fn bits(mut mask: u32) -> impl Iterator<Item = usize> {
+    std::iter::from_fn(move || {
+        let bit = (mask != 0).then(|| mask.trailing_zeros() as usize);
+        mask &= mask.wrapping_sub(1);
+        bit
+    })
+}
+
+impl GroupFrame {
+    /// Any number of rays.
+    #[inline(always)]
+    fn closest_packet<S: Simd>(&self, rays: &[TravRay], active: u32, best: &mut [Closest]) {
+        if self.rigid.is_none() {
+            self.closest_of_vector::<S>(rays, active, best, &mut None, 0.0);
+            return;
+        }
+        for start in (0..rays.len()).step_by(S::F::LEN) {
+            let end = rays.len().min(start + S::F::LEN);
+            let (rays, best) = (&rays[start..end], &mut best[start..end]);
+            self.closest_of_vector::<S>(rays, active >> start & S::F::ALL, best, &mut None, self.bounds.reach());
+        }
+    }
+
+    /// Any number of rays.
+    #[inline(always)]
+    fn occluded_packet<S: Simd>(&self, rays: &[TravRay], active: u32) -> u32 {
+        if self.rigid.is_none() {
+            return self.occluded_of_vector::<S>(rays, active, &mut None, 0.0);
+        }
+        let mut blocked = 0;
+        for start in (0..rays.len()).step_by(S::F::LEN) {
+            let rays = &rays[start..rays.len().min(start + S::F::LEN)];
+            let active = active >> start & S::F::ALL;
+            blocked |= self.occluded_of_vector::<S>(rays, active, &mut None, self.bounds.reach()) << start;
+        }
+        blocked
+    }
+
+    /// At most a vector of rays where the group is rigid; `packet` holds them once they were needed by component, for coordinates up to `reach`.
+    #[inline(always)]
+    fn closest_of_vector<S: Simd>(
+        &self,
+        rays: &[TravRay],
+        active: u32,
+        best: &mut [Closest],
+        packet: &mut Option<RigidPacket>,
+        reach: f32,
+    ) {
+        let prims = self.triangles();
         let sinks = [GroupSink { layout: &self.layout, filter: Unfiltered }; PACKET];
-        self.accel.occluded_packet::<S, (), _>(&prims, rays, active, &sinks[..rays.len()], &mut ())
+        let sinks = &sinks[..rays.len()];
+        let Some((tree, place)) = &self.rigid else {
+            self.accel.closest_packet::<S, (), _>(&prims, rays, active, best, sinks, &mut ());
+            return;
+        };
+        if packet.is_none() {
+            *packet = Some(RigidPacket::new::<S>(rays, reach));
+        }
+        if let Some(packet) = packet {
+            tree.closest_packet::<S, _>(place, &prims, (rays, packet), active, best, sinks);
+        }
+    }
+
+    /// As [`GroupFrame::closest_of_vector`].
+    #[inline(always)]
+    fn occluded_of_vector<S: Simd>(
+        &self,
+        rays: &[TravRay],
+        active: u32,
+        packet: &mut Option<RigidPacket>,
+        reach: f32,
+    ) -> u32 {
+        let prims = self.triangles();
+        let sinks = [GroupSink { layout: &self.layout, filter: Unfiltered }; PACKET];
+        let sinks = &sinks[..rays.len()];
+        let Some((tree, place)) = &self.rigid else {
+            return self.accel.occluded_packet::<S, (), _>(&prims, rays, active, sinks, &mut ());
+        };
+        if packet.is_none() {
+            *packet = Some(RigidPacket::new::<S>(rays, reach));
+        }
+        let Some(packet) = packet else { return 0 };
+        tree.occluded_packet::<S, _>(place, &prims, (rays, packet), active, sinks)
     }
 }

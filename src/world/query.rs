@@ -3,7 +3,7 @@ use super::{
     sink::{Filter, GroupSink, Unfiltered},
 };
 use crate::{
-    accel::{Closest, TravRay},
+    accel::{Closest, LEAF, OneVisit, TravRay, walk_one},
     geom::{Hit, Ray},
     simd::Simd,
 };
@@ -44,6 +44,9 @@ impl World {
         let mut best = Closest::new(&trav);
         if let [group] = &self.groups[..] {
             group.closest::<S, F>(&trav, &mut best, filter);
+        } else if let Some(line) = self.top.line::<S>(&trav) {
+            let mut visit = NearestGroup { groups: &self.groups, ray: &trav, best: &mut best, filter };
+            walk_one::<S, _>(self.top.wide(), &line, 0, &mut visit);
         } else {
             let mut walk = self.top.walk(&self.groups, &trav);
             while let Some(group) = walk.next(best.t_high()) {
@@ -59,6 +62,11 @@ impl World {
         if let [group] = &self.groups[..] {
             return group.occluded::<S, F>(&trav, filter);
         }
+        if let Some(line) = self.top.line::<S>(&trav) {
+            let mut visit = AnyGroup { groups: &self.groups, ray: &trav, filter, is_blocked: false };
+            walk_one::<S, _>(self.top.wide(), &line, 0, &mut visit);
+            return visit.is_blocked;
+        }
         let t_far = f64::from(trav.range().t_far);
         let mut walk = self.top.walk(&self.groups, &trav);
         while let Some(group) = walk.next(t_far) {
@@ -70,11 +78,53 @@ impl World {
     }
 }
 
+/// Offers the triangles of groups to a ray.
+pub(super) struct NearestGroup<'a, F> {
+    pub(super) groups: &'a [GroupFrame],
+    pub(super) ray: &'a TravRay,
+    pub(super) best: &'a mut Closest,
+    pub(super) filter: F,
+}
+
+impl<F: Filter> OneVisit for NearestGroup<'_, F> {
+    #[inline(always)]
+    fn limit(&self) -> f32 {
+        self.best.t_cull()
+    }
+
+    #[inline(always)]
+    fn leaf<S: Simd>(&mut self, word: u32) -> bool {
+        self.groups[(word & !LEAF) as usize].closest::<S, F>(self.ray, self.best, self.filter);
+        false
+    }
+}
+
+/// Asks groups whether they block a ray.
+pub(super) struct AnyGroup<'a, F> {
+    pub(super) groups: &'a [GroupFrame],
+    pub(super) ray: &'a TravRay,
+    pub(super) filter: F,
+    pub(super) is_blocked: bool,
+}
+
+impl<F: Filter> OneVisit for AnyGroup<'_, F> {
+    #[inline(always)]
+    fn limit(&self) -> f32 {
+        self.ray.range().t_far
+    }
+
+    #[inline(always)]
+    fn leaf<S: Simd>(&mut self, word: u32) -> bool {
+        self.is_blocked = self.groups[(word & !LEAF) as usize].occluded::<S, F>(self.ray, self.filter);
+        self.is_blocked
+    }
+}
+
 // Kernels must be inlined into the function that carries the SIMD level's features. A closure would not be, so
 // nothing between the dispatch and a structure is one.
 impl GroupFrame {
     #[inline(always)]
-    fn closest<S: Simd, F: Filter>(&self, ray: &TravRay, best: &mut Closest, filter: F) {
+    pub(super) fn closest<S: Simd, F: Filter>(&self, ray: &TravRay, best: &mut Closest, filter: F) {
         let sink = GroupSink { layout: &self.layout, filter };
         match &self.rigid {
             Some((tree, place)) => tree.closest::<S, _>(place, &self.triangles(), ray, best, &sink),
@@ -83,7 +133,7 @@ impl GroupFrame {
     }
 
     #[inline(always)]
-    fn occluded<S: Simd, F: Filter>(&self, ray: &TravRay, filter: F) -> bool {
+    pub(super) fn occluded<S: Simd, F: Filter>(&self, ray: &TravRay, filter: F) -> bool {
         let sink = GroupSink { layout: &self.layout, filter };
         match &self.rigid {
             Some((tree, place)) => tree.occluded::<S, _>(place, &self.triangles(), ray, &sink),

@@ -10,9 +10,10 @@ use super::{
     top_tree::{STACK, TopNode, TopTree},
 };
 use crate::accel::{
-    SpecError, TravRay,
+    Eight, EightRay, SpecError, TravRay,
     events::{EventRay, FlatLists, FlatWalk, Inversions},
 };
+use crate::simd::Simd;
 
 /// Up to this many groups are tested one by one and sorted by entry: a tree over so few costs more than it saves.
 pub(super) const FLAT: usize = 8;
@@ -58,6 +59,10 @@ impl FromStr for TopKind {
 pub(crate) struct Top {
     kind: TopKind,
     tree: TopTree,
+    /// The tree with eight children a node: what rays walk that [`EightRay`] is proven for.
+    wide: Vec<Eight>,
+    /// The greatest coordinate of the boxes.
+    reach: f32,
     lists: FlatLists,
     /// The version of the boxes that it was made of; 0 for none.
     version: u64,
@@ -90,8 +95,14 @@ impl Top {
     pub(crate) fn rebuild(&mut self, kind: TopKind, groups: &[GroupFrame]) {
         (self.kind, self.version, self.inversions) = (kind, 0, Inversions::default());
         self.tree.clear();
+        self.wide.clear();
+        self.reach = groups
+            .iter()
+            .filter(|group| !group.bounds.is_empty())
+            .fold(0.0, |reach, group| reach.max(group.bounds.reach()));
         if kind == TopKind::Bvh2 && groups.len() > FLAT {
             self.tree.build(groups.iter().map(|g| g.bounds));
+            self.tree.widen(&mut self.wide);
         }
         if kind == TopKind::Events && groups.len() > 1 {
             self.sort_events(groups);
@@ -147,6 +158,27 @@ impl Top {
             met += 1;
         }
         order
+    }
+
+    /// The greatest coordinate of the boxes.
+    pub(super) fn reach(&self) -> f32 {
+        self.reach
+    }
+
+    /// Nodes of eight children over the groups, if this is a tree.
+    #[inline(always)]
+    pub(super) fn wide(&self) -> &[Eight] {
+        &self.wide
+    }
+
+    /// A ray against the nodes of [`Top::wide`]; `None` when there are none or nothing is proven for the ray.
+    #[inline(always)]
+    pub(super) fn line<S: Simd>(&self, ray: &TravRay) -> Option<EightRay> {
+        if self.wide.is_empty() {
+            return None;
+        }
+        let range = ray.range();
+        EightRay::new::<S>(range.origin.into(), range.dir.into(), [0.0; 3], self.reach, range.t_near)
     }
 
     /// Begins a walk over the groups that `ray` may hit.

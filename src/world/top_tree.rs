@@ -1,5 +1,10 @@
+use arrayvec::ArrayVec;
+
 use super::border::{BINS, cheapest_border};
-use crate::geom::Aabb;
+use crate::{
+    accel::{EIGHT, Eight, LEAF},
+    geom::Aabb,
+};
 
 /// Depth from which splits halve the count: at most 32 more levels for any number of boxes.
 const SAH_DEPTH: usize = 16;
@@ -66,6 +71,41 @@ impl TopTree {
         let (left, right) = items.split_at_mut(mid);
         self.split(first, left, depth + 1);
         self.split(first + 1, right, depth + 1);
+    }
+
+    /// Nodes of eight children that lead to the same groups, the root first; none without boxes.
+    ///
+    /// Of a node's children the largest inner one is opened until there are as many as fit. No allocation when there were as many boxes before.
+    pub(super) fn widen(&self, wide: &mut Vec<Eight>) {
+        wide.clear();
+        if !self.nodes.is_empty() {
+            // Nodes that hold but two groups are at most half as many as these, and those above have more than a few children.
+            wide.reserve(self.nodes.len() / 3 + 2);
+            self.widen_node(0, wide);
+        }
+    }
+
+    /// Depth first; the number of the node. The builder bounds the depth.
+    #[expect(clippy::cast_possible_truncation, reason = "fewer nodes than groups, which are numbered in 31 bits")]
+    fn widen_node(&self, node: usize, wide: &mut Vec<Eight>) -> u32 {
+        let mut children = ArrayVec::<usize, EIGHT>::new();
+        children.push(node);
+        while children.len() < EIGHT {
+            let area = |&at: &usize| self.nodes[children[at]].aabb.half_area();
+            let inner = (0..children.len()).filter(|&at| !self.nodes[children[at]].leaf);
+            let Some(at) = inner.max_by(|a, b| area(a).total_cmp(&area(b))) else { break };
+            let first = self.nodes[children[at]].link as usize;
+            children[at] = first;
+            children.push(first + 1);
+        }
+        let number = wide.len();
+        wide.push(Eight::EMPTY);
+        for (slot, &child) in children.iter().enumerate() {
+            let TopNode { aabb, link, leaf } = self.nodes[child];
+            let word = if leaf { LEAF | link } else { self.widen_node(child, wide) };
+            wide[number].put(slot, &aabb, word);
+        }
+        number as u32
     }
 
     /// The root first; empty without boxes.
