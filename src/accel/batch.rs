@@ -1,14 +1,13 @@
-//! Many rays at once, compiled once for every structure and level: for callers who need no filter and no counts.
+//! Many rays at once: for callers who need no filter and no counts.
 
 use std::ops::Range;
 
 use glam::Vec3A;
 
-use super::{AnyAccel, AnyHit, Closest, PACKET, TravRay, packet::bits};
+use super::{AnyAccel, PACKET};
 use crate::{
     geom::{Forms, Hit, Ray, Triangles},
-    glam::Vec3,
-    simd::{FloatModeError, Simd, SimdLevel, Task, check_float_mode, dispatch},
+    simd::{FloatModeError, SimdLevel, check_float_mode},
 };
 
 impl AnyAccel {
@@ -55,11 +54,7 @@ impl AnyAccel {
         let out = &mut out[..rays.len()];
         for (run, together) in runs(rays, packet, self.streams()) {
             let (rays, out) = (&rays[run.clone()], &mut out[run]);
-            if together {
-                dispatch(level, ClosestBatch { accel: self, prims, rays, packet, forms, out });
-            } else {
-                self.closest_all(level, prims, rays, forms, out);
-            }
+            self.closest_all(level, prims, rays, if together { packet } else { 1 }, forms, out);
         }
         Ok(())
     }
@@ -103,11 +98,7 @@ impl AnyAccel {
         let out = &mut out[..rays.len()];
         for (run, together) in runs(rays, packet, self.streams()) {
             let (rays, out) = (&rays[run.clone()], &mut out[run]);
-            if together {
-                dispatch(level, BlockedBatch { accel: self, prims, rays, packet, forms, out });
-            } else {
-                self.occluded_all(level, prims, rays, forms, out);
-            }
+            self.occluded_all(level, prims, rays, if together { packet } else { 1 }, forms, out);
         }
         Ok(())
     }
@@ -139,83 +130,4 @@ fn points_apart(rays: &[Ray]) -> bool {
         (low, high) = (low.min(dir), high.max(dir));
     }
     (high - low).max_element() > NARROW * low.abs().max(high.abs()).max_element()
-}
-
-struct ClosestBatch<'a> {
-    accel: &'a AnyAccel,
-    prims: &'a Triangles<'a>,
-    rays: &'a [Ray],
-    packet: usize,
-    forms: Forms,
-    out: &'a mut [Option<Hit>],
-}
-
-impl Task for ClosestBatch<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run<S: Simd>(self) {
-        let Self { accel, prims, rays, packet, forms, out } = self;
-        for (rays, out) in rays.chunks(packet).zip(out.chunks_mut(packet)) {
-            let Some((rays, active)) = Together::of(rays, forms) else { return };
-            let mut best = [Closest::new(&rays.0[0]); PACKET];
-            for (best, ray) in best.iter_mut().zip(&rays.0) {
-                *best = Closest::new(ray);
-            }
-            let count = out.len();
-            let sinks = [AnyHit; PACKET];
-            let best = &mut best[..count];
-            accel.closest_packet::<S, _, _>(prims, &rays.0[..count], active, best, &sinks[..count], &mut ());
-            for ((out, best), ray) in out.iter_mut().zip(best).zip(&rays.0) {
-                *out = best.hit(ray);
-            }
-        }
-    }
-}
-
-struct BlockedBatch<'a> {
-    accel: &'a AnyAccel,
-    prims: &'a Triangles<'a>,
-    rays: &'a [Ray],
-    packet: usize,
-    forms: Forms,
-    out: &'a mut [bool],
-}
-
-impl Task for BlockedBatch<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run<S: Simd>(self) {
-        let Self { accel, prims, rays, packet, forms, out } = self;
-        for (rays, out) in rays.chunks(packet).zip(out.chunks_mut(packet)) {
-            let Some((rays, active)) = Together::of(rays, forms) else { return };
-            let count = out.len();
-            let sinks = [AnyHit; PACKET];
-            let blocked = accel.occluded_packet::<S, _, _>(prims, &rays.0[..count], active, &sinks[..count], &mut ());
-            out.fill(false);
-            for i in bits(blocked) {
-                out[i] = true;
-            }
-        }
-    }
-}
-
-/// A packet's rays; those that can hit nothing are replaced by a stand-in that is not active.
-struct Together([TravRay; PACKET]);
-
-impl Together {
-    /// The rays, and the bits of those that can hit something.
-    #[inline(always)]
-    fn of(rays: &[Ray], forms: Forms) -> Option<(Self, u32)> {
-        let mut out = Self([TravRay::with_forms(&Ray::new(Vec3::ZERO, Vec3::X), forms)?; PACKET]);
-        let mut active = 0;
-        for (i, ray) in rays.iter().enumerate() {
-            if let Some(ray) = TravRay::with_forms(ray, forms) {
-                out.0[i] = ray;
-                active |= 1 << i;
-            }
-        }
-        Some((out, active))
-    }
 }

@@ -77,6 +77,12 @@ impl TriBlock {
         ]
     }
 
+    /// Corners by axis and lane.
+    #[inline(always)]
+    pub(super) fn corners_by_axis(&self) -> &[[[f32; 4]; 3]; 3] {
+        &self.corners
+    }
+
     /// Number of the triangle in a lane, or [`NO_PRIM`].
     #[inline(always)]
     pub(super) fn prim(&self, lane: usize) -> u32 {

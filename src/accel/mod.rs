@@ -219,16 +219,31 @@ pub trait Accel: Sized + Clone + Send + Sync + std::fmt::Debug + 'static {
         count: &mut C,
     ) -> bool;
 
-    /// The closest hit of every ray by itself, into `out`, which is as long: for callers who need no filter and no counts.
+    /// The closest hit of every ray into `out`, which is as long, for callers who need no filter and no counts: rays by themselves where `packet` is 1, else
+    /// in packets of up to `packet` consecutive ones.
     #[inline(always)]
-    fn closest_all<S: Simd>(&self, prims: &Triangles<'_>, rays: &[Ray], forms: Forms, out: &mut [Option<Hit>]) {
-        run::closest_all::<S, Self>(self, prims, rays, forms, out);
+    fn closest_all<S: Simd>(
+        &self,
+        prims: &Triangles<'_>,
+        rays: &[Ray],
+        packet: usize,
+        forms: Forms,
+        out: &mut [Option<Hit>],
+    ) {
+        run::closest_all::<S, Self>(self, prims, rays, packet, forms, out);
     }
 
     /// As [`Accel::closest_all`]: whether every ray is blocked.
     #[inline(always)]
-    fn occluded_all<S: Simd>(&self, prims: &Triangles<'_>, rays: &[Ray], forms: Forms, out: &mut [bool]) {
-        run::occluded_all::<S, Self>(self, prims, rays, forms, out);
+    fn occluded_all<S: Simd>(
+        &self,
+        prims: &Triangles<'_>,
+        rays: &[Ray],
+        packet: usize,
+        forms: Forms,
+        out: &mut [bool],
+    ) {
+        run::occluded_all::<S, Self>(self, prims, rays, packet, forms, out);
     }
 
     /// As [`Accel::closest`] for each ray whose bit is set in `active`; `best` and `sinks` go with the rays.

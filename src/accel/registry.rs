@@ -189,11 +189,12 @@ macro_rules! register_accels {
                 level: SimdLevel,
                 prims: &Triangles<'_>,
                 rays: &[Ray],
+                packet: usize,
                 forms: Forms,
                 out: &mut [Option<Hit>],
             ) {
                 match self {
-                    $(Self::$kind(accel) => dispatch(level, ClosestAllTask { accel, prims, rays, forms, out }),)*
+                    $(Self::$kind(accel) => dispatch(level, ClosestAllTask { accel, prims, rays, packet, forms, out }),)*
                 }
             }
 
@@ -203,11 +204,12 @@ macro_rules! register_accels {
                 level: SimdLevel,
                 prims: &Triangles<'_>,
                 rays: &[Ray],
+                packet: usize,
                 forms: Forms,
                 out: &mut [bool],
             ) {
                 match self {
-                    $(Self::$kind(accel) => dispatch(level, OccludedAllTask { accel, prims, rays, forms, out }),)*
+                    $(Self::$kind(accel) => dispatch(level, OccludedAllTask { accel, prims, rays, packet, forms, out }),)*
                 }
             }
 

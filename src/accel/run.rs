@@ -1,8 +1,9 @@
 //! The queries as tasks, so that a structure's kernel is compiled once a level and sink, not at every place that asks.
 
-use super::{Accel, AnyHit, Closest, Counter, HitSink, TravRay, packet::bits};
+use super::{Accel, AnyHit, Closest, Counter, HitSink, PACKET, TravRay, packet::bits};
 use crate::{
     geom::{Forms, Hit, Ray, Triangles},
+    glam::Vec3,
     simd::{Simd, Task},
 };
 
@@ -119,38 +120,139 @@ impl<A: Accel, C: Counter, K: HitSink> Task for OccludedPacketTask<'_, A, C, K> 
     }
 }
 
-/// [`Accel::closest_all`], a ray after the other.
+/// [`Accel::closest_all`] by single rays or by packets.
 #[inline(always)]
 pub(super) fn closest_all<S: Simd, A: Accel>(
     accel: &A,
     prims: &Triangles<'_>,
     rays: &[Ray],
+    packet: usize,
     forms: Forms,
     out: &mut [Option<Hit>],
 ) {
-    for (ray, out) in rays.iter().zip(out) {
-        *out = None;
-        if let Some(ray) = TravRay::with_forms(ray, forms) {
-            let mut best = Closest::new(&ray);
-            S::call(ClosestTask { accel, prims, ray: &ray, best: &mut best, sink: &AnyHit, count: &mut () });
-            *out = best.hit(&ray);
+    if packet > 1 {
+        for (rays, out) in rays.chunks(packet).zip(out.chunks_mut(packet)) {
+            S::call(ClosestRaysTask { accel, prims, rays, forms, out });
         }
+        return;
+    }
+    for (ray, out) in rays.iter().zip(out) {
+        *out = closest_one::<S, A>(accel, prims, ray, forms);
     }
 }
 
-/// [`Accel::occluded_all`], a ray after the other.
+/// The closest hit of one ray.
+#[inline(always)]
+pub(super) fn closest_one<S: Simd, A: Accel>(
+    accel: &A,
+    prims: &Triangles<'_>,
+    ray: &Ray,
+    forms: Forms,
+) -> Option<Hit> {
+    let ray = TravRay::with_forms(ray, forms)?;
+    let mut best = Closest::new(&ray);
+    S::call(ClosestTask { accel, prims, ray: &ray, best: &mut best, sink: &AnyHit, count: &mut () });
+    best.hit(&ray)
+}
+
+/// As [`closest_all`].
 #[inline(always)]
 pub(super) fn occluded_all<S: Simd, A: Accel>(
     accel: &A,
     prims: &Triangles<'_>,
     rays: &[Ray],
+    packet: usize,
     forms: Forms,
     out: &mut [bool],
 ) {
+    if packet > 1 {
+        for (rays, out) in rays.chunks(packet).zip(out.chunks_mut(packet)) {
+            S::call(OccludedRaysTask { accel, prims, rays, forms, out });
+        }
+        return;
+    }
     for (ray, out) in rays.iter().zip(out) {
-        *out = false;
-        if let Some(ray) = TravRay::with_forms(ray, forms) {
-            *out = S::call(OccludedTask { accel, prims, ray: &ray, sink: &AnyHit, count: &mut () });
+        *out = occluded_one::<S, A>(accel, prims, ray, forms);
+    }
+}
+
+/// Whether one ray is blocked.
+#[inline(always)]
+pub(super) fn occluded_one<S: Simd, A: Accel>(accel: &A, prims: &Triangles<'_>, ray: &Ray, forms: Forms) -> bool {
+    let Some(ray) = TravRay::with_forms(ray, forms) else { return false };
+    S::call(OccludedTask { accel, prims, ray: &ray, sink: &AnyHit, count: &mut () })
+}
+
+/// A packet's rays; those that can hit nothing are replaced by a stand-in that is not active.
+struct Together([TravRay; PACKET]);
+
+impl Together {
+    /// The rays, and the bits of those that can hit something.
+    #[inline(always)]
+    fn of(rays: &[Ray], forms: Forms) -> Option<(Self, u32)> {
+        let mut out = Self([TravRay::with_forms(&Ray::new(Vec3::ZERO, Vec3::X), forms)?; PACKET]);
+        let mut active = 0;
+        for (i, ray) in rays.iter().enumerate() {
+            if let Some(ray) = TravRay::with_forms(ray, forms) {
+                out.0[i] = ray;
+                active |= 1 << i;
+            }
+        }
+        Some((out, active))
+    }
+}
+
+/// The closest hits of a packet.
+struct ClosestRaysTask<'a, A> {
+    accel: &'a A,
+    prims: &'a Triangles<'a>,
+    rays: &'a [Ray],
+    forms: Forms,
+    out: &'a mut [Option<Hit>],
+}
+
+impl<A: Accel> Task for ClosestRaysTask<'_, A> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self) {
+        let Self { accel, prims, rays, forms, out } = self;
+        let Some((rays, active)) = Together::of(rays, forms) else { return };
+        let mut best = [Closest::new(&rays.0[0]); PACKET];
+        for (best, ray) in best.iter_mut().zip(&rays.0) {
+            *best = Closest::new(ray);
+        }
+        let (count, sinks) = (out.len(), &[AnyHit; PACKET]);
+        let (rays, best, sinks) = (&rays.0[..count], &mut best[..count], &sinks[..count]);
+        S::call(ClosestPacketTask { accel, prims, rays, active, best, sinks, count: &mut () });
+        for ((out, best), ray) in out.iter_mut().zip(best).zip(rays) {
+            *out = best.hit(ray);
+        }
+    }
+}
+
+/// Whether the rays of a packet are blocked.
+struct OccludedRaysTask<'a, A> {
+    accel: &'a A,
+    prims: &'a Triangles<'a>,
+    rays: &'a [Ray],
+    forms: Forms,
+    out: &'a mut [bool],
+}
+
+impl<A: Accel> Task for OccludedRaysTask<'_, A> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self) {
+        let Self { accel, prims, rays, forms, out } = self;
+        let Some((rays, active)) = Together::of(rays, forms) else { return };
+        let count = out.len();
+        let (rays, sinks) = (&rays.0[..count], &[AnyHit; PACKET][..count]);
+        let blocked = S::call(OccludedPacketTask { accel, prims, rays, active, sinks, count: &mut () });
+        out.fill(false);
+        for i in bits(blocked) {
+            out[i] = true;
         }
     }
 }
@@ -160,6 +262,7 @@ pub(super) struct ClosestAllTask<'a, A> {
     pub(super) accel: &'a A,
     pub(super) prims: &'a Triangles<'a>,
     pub(super) rays: &'a [Ray],
+    pub(super) packet: usize,
     pub(super) forms: Forms,
     pub(super) out: &'a mut [Option<Hit>],
 }
@@ -169,7 +272,7 @@ impl<A: Accel> Task for ClosestAllTask<'_, A> {
 
     #[inline(always)]
     fn run<S: Simd>(self) {
-        self.accel.closest_all::<S>(self.prims, self.rays, self.forms, self.out);
+        self.accel.closest_all::<S>(self.prims, self.rays, self.packet, self.forms, self.out);
     }
 }
 
@@ -178,6 +281,7 @@ pub(super) struct OccludedAllTask<'a, A> {
     pub(super) accel: &'a A,
     pub(super) prims: &'a Triangles<'a>,
     pub(super) rays: &'a [Ray],
+    pub(super) packet: usize,
     pub(super) forms: Forms,
     pub(super) out: &'a mut [bool],
 }
@@ -187,6 +291,6 @@ impl<A: Accel> Task for OccludedAllTask<'_, A> {
 
     #[inline(always)]
     fn run<S: Simd>(self) {
-        self.accel.occluded_all::<S>(self.prims, self.rays, self.forms, self.out);
+        self.accel.occluded_all::<S>(self.prims, self.rays, self.packet, self.forms, self.out);
     }
 }

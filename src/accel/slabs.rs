@@ -25,8 +25,11 @@ const GROW: f32 = 1.0 + PAD;
 /// Origins up to this many times farther out than any plane: farther ones would widen boxes by more than the least triangles measure.
 const FAR: f32 = 1024.0;
 
-/// Greatest `|d|∞`, and the inverse of the least, of rays along a plane: 2^30.
-const STEADY: f32 = 1_073_741_824.0;
+/// The least and the greatest `|d|∞` of rays along a plane: 2^-30 and 2^30.
+pub(super) const STEADY: [f32; 2] = [1.0 / 1_073_741_824.0, 1_073_741_824.0];
+
+/// The least size of a direction's components other than 0.
+pub(super) const SLANTED: f32 = 1.0 / ORDINARY_MAX;
 
 /// How many times a plane's distance is magnified where the ray runs along it: 2^25.
 const STEEP: f32 = 33_554_432.0;
@@ -94,13 +97,19 @@ impl<L: Lanes<Elem = f32>> Slab<L> {
 /// True when [`Slab`] is proven for the ray and planes up to `reach` from 0.
 #[inline(always)]
 pub(super) fn fits(ray: &TravRay, reach: f32) -> bool {
-    ray.is_steady() && ray.is_within(FAR * reach) && reach <= ORDINARY_MAX
+    ray.is_steady() && ray.is_within(farthest(reach)) && reach <= ORDINARY_MAX
+}
+
+/// The greatest size of the coordinates of an origin that [`Slab`] is proven for.
+#[inline(always)]
+pub(super) fn farthest(reach: f32) -> f32 {
+    FAR * reach
 }
 
 /// True for a `|d|∞` that [`Slab`] is proven for where the ray runs along a plane.
 #[inline(always)]
 pub(super) fn is_steady(size: f32) -> bool {
-    (1.0 / STEADY..=STEADY).contains(&size)
+    (STEADY[0]..=STEADY[1]).contains(&size)
 }
 
 /// One ray against two boxes at once: factor and summand of each axis for lanes of entry, entry, negated exit, negated exit. As [`Slab`], lane

@@ -5,7 +5,7 @@ use glam::Vec3;
 /// `dir` may have any length; `t_near >= 0`; `t_far` may be infinite. NaN anywhere, a zero direction or
 /// `t_far < t_near` makes every query a miss.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct Ray {
     /// Start point.
     pub origin: Vec3,

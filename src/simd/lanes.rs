@@ -31,6 +31,18 @@ pub trait Simd: Copy + Send + Sync + 'static {
     /// The first numbers of a slice as f64, exactly. Panics when it is too short.
     fn load_wide(from: &[f32]) -> Self::D;
 
+    /// The columns of as many records as `F` has lanes: number j of record i goes to lane i of row j. Panics when there are fewer records.
+    fn columns(records: &[[f32; 8]], to: &mut [[f32; 16]; 8]);
+
+    /// The least and the greatest number of the chosen lanes; infinity and its negative where there are none. No number may be NaN.
+    fn range(numbers: Self::F, chosen: u32) -> [f32; 2];
+
+    /// Rounds the ends of intervals to f32 and writes those of `low`, 0 as +0: the lanes whose ends agree. Panics when `to` is too short.
+    fn agreed(low: Self::D, high: Self::D, to: &mut [f32]) -> u32;
+
+    /// Writes `word` to the places whose bit is set, as many as `F` has lanes.
+    fn write_where(chosen: u32, word: u32, to: &mut [u32; 16]);
+
     /// Eight words.
     fn words(from: &[u32; 8]) -> Self::U8;
 

@@ -31,6 +31,41 @@ impl Simd for Scalar {
     }
 
     #[inline(always)]
+    fn columns(records: &[[f32; 8]], to: &mut [[f32; 16]; 8]) {
+        for (lane, record) in records[..8].iter().enumerate() {
+            for (row, &number) in to.iter_mut().zip(record) {
+                row[lane] = number;
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn range(numbers: Self::F, chosen: u32) -> [f32; 2] {
+        let least = Lanes::select(chosen, numbers, Array([f32::INFINITY; 8]));
+        let greatest = Lanes::select(chosen, numbers, Array([f32::NEG_INFINITY; 8]));
+        [least.0.into_iter().fold(f32::INFINITY, f32::min), greatest.0.into_iter().fold(f32::NEG_INFINITY, f32::max)]
+    }
+
+    #[inline(always)]
+    #[expect(clippy::cast_possible_truncation, clippy::float_cmp, reason = "roundings are compared")]
+    fn agreed(low: Self::D, high: Self::D, to: &mut [f32]) -> u32 {
+        let mut agreed = 0;
+        for (lane, to) in to[..4].iter_mut().enumerate() {
+            let (low, high) = (low.0[lane] as f32, high.0[lane] as f32);
+            *to = low + 0.0;
+            agreed |= u32::from(low == high) << lane;
+        }
+        agreed
+    }
+
+    #[inline(always)]
+    fn write_where(chosen: u32, word: u32, to: &mut [u32; 16]) {
+        for (lane, to) in to[..8].iter_mut().enumerate() {
+            *to = if chosen >> lane & 1 == 1 { word } else { *to };
+        }
+    }
+
+    #[inline(always)]
     fn words(from: &[u32; 8]) -> [u32; 8] {
         *from
     }

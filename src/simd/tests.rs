@@ -104,6 +104,35 @@ impl Task for Operations<'_> {
             S::load_wide(&self.a[first..]).store(&mut wide[first..]);
         }
         out.extend(bits64(&wide));
+        let records: Vec<[f32; 8]> = (0..16).map(|i| std::array::from_fn(|j| self.a[(3 * i + j) % 16])).collect();
+        for first in (0..16).step_by(S::F::LEN) {
+            let mut rows = [[0.0; 16]; 8];
+            S::columns(&records[first..], &mut rows);
+            for (j, row) in rows.iter().enumerate() {
+                let expected: Vec<f32> = records[first..][..S::F::LEN].iter().map(|record| record[j]).collect();
+                assert!(bits32(&row[..S::F::LEN]).eq(bits32(&expected)));
+            }
+        }
+        let mut ends = [f32::INFINITY, f32::NEG_INFINITY];
+        for first in (0..16).step_by(S::F::LEN) {
+            let numbers: Vec<f32> = self.b.iter().map(|b| if b.is_nan() { 0.0 } else { *b }).collect();
+            let [least, greatest] = S::range(S::F::load(&numbers[first..]), 0b0101_1010_0111_0010 >> first);
+            ends = [if least < ends[0] { least } else { ends[0] }, if greatest > ends[1] { greatest } else { ends[1] }];
+        }
+        // The sign of a zero among equals is left open.
+        out.extend(bits32(&ends.map(|end| end + 0.0)));
+        let (mut row, mut agreed) = ([0.0; 16], 0);
+        for first in (0..16).step_by(S::D::LEN) {
+            let (a, b) = (S::D::load(&self.wide.0[first..]), S::D::load(&self.wide.1[first..]));
+            agreed |= S::agreed(a, b, &mut row[first..]) << first;
+        }
+        out.extend(bits32(&row));
+        out.push(u64::from(agreed));
+        for first in (0..16).step_by(S::F::LEN) {
+            let mut places = [7; 16];
+            S::write_where(0b1001_0110_1110_0101 >> first, 0xf000_0001, &mut places);
+            out.extend(places[..S::F::LEN].iter().map(|&word| u64::from(word)));
+        }
         out
     }
 }

@@ -49,6 +49,44 @@ impl Simd for Avx2 {
     }
 
     #[inline(always)]
+    fn columns(records: &[[f32; 8]], to: &mut [[f32; 16]; 8]) {
+        let records: &[[f32; 8]; 8] = records[..8].try_into().expect("the slice has that length");
+        for half in 0..2 {
+            // Four numbers of records 0 to 3 below those of records 4 to 7.
+            let (a, b) = (far_pair(records, 0, 4 * half), far_pair(records, 1, 4 * half));
+            let (c, d) = (far_pair(records, 2, 4 * half), far_pair(records, 3, 4 * half));
+            let (ab, cd) = (call!(_mm256_unpacklo_ps(a, b)), call!(_mm256_unpacklo_ps(c, d)));
+            F32x8(call!(_mm256_shuffle_ps::<LOWS>(ab, cd))).store(&mut to[4 * half]);
+            F32x8(call!(_mm256_shuffle_ps::<HIGHS>(ab, cd))).store(&mut to[4 * half + 1]);
+            let (ab, cd) = (call!(_mm256_unpackhi_ps(a, b)), call!(_mm256_unpackhi_ps(c, d)));
+            F32x8(call!(_mm256_shuffle_ps::<LOWS>(ab, cd))).store(&mut to[4 * half + 2]);
+            F32x8(call!(_mm256_shuffle_ps::<HIGHS>(ab, cd))).store(&mut to[4 * half + 3]);
+        }
+    }
+
+    #[inline(always)]
+    fn range(numbers: F32x8, chosen: u32) -> [f32; 2] {
+        let least = F32x8::select(chosen, numbers, F32x8::splat(f32::INFINITY));
+        let greatest = F32x8::select(chosen, numbers, F32x8::splat(f32::NEG_INFINITY));
+        [least_of(least), -least_of(-greatest)]
+    }
+
+    #[inline(always)]
+    fn agreed(low: F64x4, high: F64x4, to: &mut [f32]) -> u32 {
+        let (low, high) = (call!(_mm256_cvtpd_ps(low.0)), call!(_mm256_cvtpd_ps(high.0)));
+        F32x4(call!(_mm_add_ps(low, call!(_mm_setzero_ps())))).store(to);
+        call!(_mm_movemask_ps(call!(_mm_cmpeq_ps(low, high)))).cast_unsigned()
+    }
+
+    #[inline(always)]
+    fn write_where(chosen: u32, word: u32, to: &mut [u32; 16]) {
+        let to = to.first_chunk_mut().expect("eight of sixteen");
+        let all = F32x8(call!(_mm256_castsi256_ps(call!(_mm256_set1_epi32(word.cast_signed())))));
+        let old = F32x8(call!(_mm256_castsi256_ps(load_words(to))));
+        store_words(call!(_mm256_castps_si256(F32x8::select(chosen, all, old).0)), to);
+    }
+
+    #[inline(always)]
     fn words(from: &[u32; 8]) -> __m256i {
         load_words(from)
     }
@@ -121,6 +159,51 @@ impl Simd for Avx512 {
     }
 
     #[inline(always)]
+    fn columns(records: &[[f32; 8]], to: &mut [[f32; 16]; 8]) {
+        let records: &[[f32; 8]; 16] = records[..16].try_into().expect("the slice has that length");
+        // All of two records four apart in each vector.
+        let (a, b) = (near_pair(records, 0), near_pair(records, 1));
+        let (c, d) = (near_pair(records, 2), near_pair(records, 3));
+        let (e, f) = (near_pair(records, 8), near_pair(records, 9));
+        let (g, h) = (near_pair(records, 10), near_pair(records, 11));
+        let (ab, cd) = (call!(_mm512_unpacklo_ps(a, b)), call!(_mm512_unpacklo_ps(c, d)));
+        let (ef, gh) = (call!(_mm512_unpacklo_ps(e, f)), call!(_mm512_unpacklo_ps(g, h)));
+        let low = (call!(_mm512_shuffle_ps::<LOWS>(ab, cd)), call!(_mm512_shuffle_ps::<LOWS>(ef, gh)));
+        write_columns(low, to, 0);
+        let low = (call!(_mm512_shuffle_ps::<HIGHS>(ab, cd)), call!(_mm512_shuffle_ps::<HIGHS>(ef, gh)));
+        write_columns(low, to, 1);
+        let (ab, cd) = (call!(_mm512_unpackhi_ps(a, b)), call!(_mm512_unpackhi_ps(c, d)));
+        let (ef, gh) = (call!(_mm512_unpackhi_ps(e, f)), call!(_mm512_unpackhi_ps(g, h)));
+        let high = (call!(_mm512_shuffle_ps::<LOWS>(ab, cd)), call!(_mm512_shuffle_ps::<LOWS>(ef, gh)));
+        write_columns(high, to, 2);
+        let high = (call!(_mm512_shuffle_ps::<HIGHS>(ab, cd)), call!(_mm512_shuffle_ps::<HIGHS>(ef, gh)));
+        write_columns(high, to, 3);
+    }
+
+    #[inline(always)]
+    fn range(numbers: F32x16, chosen: u32) -> [f32; 2] {
+        let least = F32x16::select(chosen, numbers, F32x16::splat(f32::INFINITY));
+        let greatest = F32x16::select(chosen, numbers, F32x16::splat(f32::NEG_INFINITY));
+        let (low, high) = (halves(least), halves(-greatest));
+        [least_of(low.0.min(low.1)), -least_of(high.0.min(high.1))]
+    }
+
+    #[inline(always)]
+    fn agreed(low: F64x8, high: F64x8, to: &mut [f32]) -> u32 {
+        let (low, high) = (call!(_mm512_cvtpd_ps(low.0)), call!(_mm512_cvtpd_ps(high.0)));
+        F32x8(call!(_mm256_add_ps(low, call!(_mm256_setzero_ps())))).store(to);
+        call!(_mm256_movemask_ps(call!(_mm256_cmp_ps::<_CMP_EQ_OQ>(low, high)))).cast_unsigned()
+    }
+
+    #[inline(always)]
+    #[expect(clippy::cast_possible_truncation, reason = "a bit a lane")]
+    fn write_where(chosen: u32, word: u32, to: &mut [u32; 16]) {
+        let all = call!(_mm512_set1_epi32(word.cast_signed()));
+        // SAFETY: the array is as long as the unaligned store; AVX-512 is in the level (module head).
+        unsafe { _mm512_mask_storeu_epi32(to.as_mut_ptr().cast(), chosen as u16, all) };
+    }
+
+    #[inline(always)]
     fn words(from: &[u32; 8]) -> __m256i {
         load_words(from)
     }
@@ -177,6 +260,50 @@ impl Simd for Avx512 {
 fn widen(narrow: F32x4) -> F64x4 {
     // SAFETY: AVX is in the level (module head).
     F64x4(unsafe { _mm256_cvtps_pd(narrow.0) })
+}
+
+/// The first two of each four numbers' first pairs of unpacked rows, and the last two.
+const LOWS: i32 = 0b01_00_01_00;
+const HIGHS: i32 = 0b11_10_11_10;
+/// The even quarters of two vectors, and the odd ones.
+const EVEN: i32 = 0b10_00_10_00;
+const ODD: i32 = 0b11_01_11_01;
+/// The upper half.
+const UPPER: i32 = 1;
+
+/// Four numbers from `at` on of record i below those of record i + 4.
+#[inline(always)]
+fn far_pair(records: &[[f32; 8]; 8], i: usize, at: usize) -> __m256 {
+    let (low, high) = (F32x4::load(&records[i][at..]), F32x4::load(&records[i + 4][at..]));
+    call!(_mm256_insertf128_ps::<UPPER>(call!(_mm256_castps128_ps256(low.0)), high.0))
+}
+
+/// Record i below record i + 4.
+#[inline(always)]
+fn near_pair(records: &[[f32; 8]; 16], i: usize) -> __m512 {
+    let (low, high) = (F32x8::load(&records[i]), F32x8::load(&records[i + 4]));
+    call!(_mm512_insertf32x8::<UPPER>(call!(_mm512_castps256_ps512(low.0)), high.0))
+}
+
+/// Rows `column` and `column + 4`: the even and the odd quarters of both.
+#[inline(always)]
+fn write_columns((a, b): (__m512, __m512), to: &mut [[f32; 16]; 8], column: usize) {
+    F32x16(call!(_mm512_shuffle_f32x4::<EVEN>(a, b))).store(&mut to[column]);
+    F32x16(call!(_mm512_shuffle_f32x4::<ODD>(a, b))).store(&mut to[column + 4]);
+}
+
+#[inline(always)]
+fn halves(numbers: F32x16) -> (F32x8, F32x8) {
+    (F32x8(call!(_mm512_castps512_ps256(numbers.0))), F32x8(call!(_mm512_extractf32x8_ps::<UPPER>(numbers.0))))
+}
+
+/// The least of eight numbers.
+#[inline(always)]
+fn least_of(numbers: F32x8) -> f32 {
+    let (low, high) = (call!(_mm256_castps256_ps128(numbers.0)), call!(_mm256_extractf128_ps::<UPPER>(numbers.0)));
+    let four = call!(_mm_min_ps(low, high));
+    let two = call!(_mm_min_ps(four, call!(_mm_movehl_ps(four, four))));
+    call!(_mm_cvtss_f32(call!(_mm_min_ss(two, call!(_mm_movehdup_ps(two))))))
 }
 
 #[inline(always)]

@@ -22,10 +22,10 @@ use super::{
     block::TriBlock,
     check_indices,
     lineage::{self, Lineage, Refittable},
-    sah,
+    run, sah,
     topology::{self, Child, Cut, wide::collapse},
     wide::{
-        Place, Tree, WIDTH, packet as wide_packet,
+        Place, Tree, WIDTH, coherent, packet as wide_packet,
         refit::{Store, Subtree},
     },
 };
@@ -103,6 +103,11 @@ impl Tree for Bvh8 {
     #[inline(always)]
     fn node(&self, number: usize) -> &Node {
         &self.nodes[number]
+    }
+
+    #[inline(always)]
+    fn blocks(&self) -> &[TriBlock] {
+        &self.blocks
     }
 
     #[inline(always)]
@@ -241,13 +246,39 @@ impl Accel for Bvh8 {
     }
 
     #[inline(always)]
-    fn closest_all<S: Simd>(&self, _prims: &Triangles<'_>, rays: &[Ray], forms: Forms, out: &mut [Option<Hit>]) {
-        stream::closest::<S>(self, rays, forms, out);
+    fn closest_all<S: Simd>(
+        &self,
+        prims: &Triangles<'_>,
+        rays: &[Ray],
+        packet: usize,
+        forms: Forms,
+        out: &mut [Option<Hit>],
+    ) {
+        if packet == 1 {
+            stream::closest::<S>(self, rays, forms, out);
+        } else if forms == Forms::EXACT {
+            coherent::closest::<S, Self>(self, prims, rays, packet, forms, out);
+        } else {
+            run::closest_all::<S, Self>(self, prims, rays, packet, forms, out);
+        }
     }
 
     #[inline(always)]
-    fn occluded_all<S: Simd>(&self, _prims: &Triangles<'_>, rays: &[Ray], forms: Forms, out: &mut [bool]) {
-        stream::occluded::<S>(self, rays, forms, out);
+    fn occluded_all<S: Simd>(
+        &self,
+        prims: &Triangles<'_>,
+        rays: &[Ray],
+        packet: usize,
+        forms: Forms,
+        out: &mut [bool],
+    ) {
+        if packet == 1 {
+            stream::occluded::<S>(self, rays, forms, out);
+        } else if forms == Forms::EXACT {
+            coherent::occluded::<S, Self>(self, prims, rays, packet, forms, out);
+        } else {
+            run::occluded_all::<S, Self>(self, prims, rays, packet, forms, out);
+        }
     }
 
     #[inline(always)]

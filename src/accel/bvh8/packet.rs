@@ -14,7 +14,7 @@ use crate::{
         slabs::{Extent, Slab},
         wide::{
             WIDTH,
-            packet::{Entry, GROW, PacketTree, Spread, Start, Together, range, spreads},
+            packet::{Entry, GROW, PacketTree, Spread, Start, Together, spreads},
             walk,
         },
     },
@@ -62,8 +62,8 @@ impl<S: Simd> Packet<S> {
         Self {
             ends: [ends(x, backward[0]), ends(y, backward[1]), ends(z, backward[2])],
             backward: [usize::from(backward[0]), usize::from(backward[1]), usize::from(backward[2])],
-            all_near: S::F8::splat(range(&packet.t_near32, active)[0]),
-            all_far: S::F8::splat(range(&packet.t_cull, active)[1]),
+            all_near: S::F8::splat(S::range(S::F::load(&packet.t_near32), active)[0]),
+            all_far: S::F8::splat(S::range(S::F::load(&packet.t_cull), active)[1]),
             active,
             slabs: [
                 Slab::new(origin[0], dir[0], &extent, nodes),
@@ -122,7 +122,7 @@ impl<S: Simd> Together<S, Bvh8> for Packet<S> {
     #[inline(always)]
     fn limit(&mut self, packet: &PacketRays) {
         self.limit = S::F::load(&packet.t_cull);
-        self.all_far = S::F8::splat(range(&packet.t_cull, self.active)[1]);
+        self.all_far = S::F8::splat(S::range(S::F::load(&packet.t_cull), self.active)[1]);
     }
 
     #[inline(always)]

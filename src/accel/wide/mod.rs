@@ -1,5 +1,6 @@
 //! What trees of eight children a node share: their form, the walk of single rays and the refit.
 
+pub(super) mod coherent;
 pub(super) mod packet;
 pub(super) mod refit;
 pub(super) mod walk;
@@ -18,6 +19,8 @@ pub(super) trait Tree {
     fn reach(&self) -> f32;
     /// A node by its number.
     fn node(&self, number: usize) -> &Self::Node;
+    /// The blocks of all leaves.
+    fn blocks(&self) -> &[TriBlock];
     /// Blocks of a leaf that has some; its triangles are counted.
     fn leaf_blocks<C: Counter>(&self, word: Word<Self>, count: &mut C) -> &[TriBlock];
 }

@@ -149,11 +149,11 @@ pub(in crate::accel) fn occluded_packet<S: Simd, T: PacketTree, C: Counter, H: H
 }
 
 /// Nodes to visit, the next last.
-type Stack<S, T, P> = ArrayVec<Entry<S, T, P>, { MAX_DEPTH * (WIDTH - 1) + 1 }>;
+pub(super) type Stack<S, T, P> = ArrayVec<Entry<S, T, P>, { MAX_DEPTH * (WIDTH - 1) + 1 }>;
 
 /// Puts the children that rays of an entry meet on the stack, nearest last.
 #[inline(always)]
-fn descend<S: Simd, T: Tree, P: Together<S, T>>(
+pub(super) fn descend<S: Simd, T: Tree, P: Together<S, T>>(
     together: &P,
     node: &T::Node,
     (mask, mark, rays): (u32, P::Mark, &P::Rays),
@@ -294,24 +294,10 @@ impl Spread {
 pub(in crate::accel) fn spreads<S: Simd>(packet: &PacketRays, active: u32) -> [Spread; 3] {
     let mut out = [Spread { origin: [0.0; 2], inv: [0.0; 2] }; 3];
     for (axis, out) in out.iter_mut().enumerate() {
-        let mut inv = [0.0; PACKET];
-        for first in (0..PACKET).step_by(S::F::LEN) {
-            (S::F::splat(1.0) / S::F::load(&packet.dir32[axis][first..])).store(&mut inv[first..]);
-        }
-        *out = Spread { origin: range(&packet.origin32[axis], active), inv: range(&inv, active) };
+        let inv = S::F::splat(1.0) / S::F::load(&packet.dir32[axis]);
+        *out = Spread { origin: S::range(S::F::load(&packet.origin32[axis]), active), inv: S::range(inv, active) };
     }
     out
-}
-
-/// The least and the greatest number of the lanes in `active`.
-#[inline(always)]
-pub(in crate::accel) fn range(row: &[f32; PACKET], active: u32) -> [f32; 2] {
-    let (mut least, mut greatest) = (f32::INFINITY, f32::NEG_INFINITY);
-    for i in bits(active) {
-        least = if row[i] < least { row[i] } else { least };
-        greatest = if row[i] > greatest { row[i] } else { greatest };
-    }
-    [least, greatest]
 }
 
 /// The rays that go into one vector each time: the first, the end, and the active ones among them.

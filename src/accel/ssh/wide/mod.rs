@@ -80,6 +80,11 @@ impl<const K: usize> Tree for Wide<K> {
     }
 
     #[inline(always)]
+    fn blocks(&self) -> &[TriBlock] {
+        &self.blocks
+    }
+
+    #[inline(always)]
     fn leaf_blocks<C: Counter>(&self, word: Word, count: &mut C) -> &[TriBlock] {
         let place = word.index();
         let blocks = &self.blocks[place..place + self.span(place)];

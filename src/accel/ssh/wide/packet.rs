@@ -14,7 +14,7 @@ use crate::{
         ssh::packet::{self as slabs, PacketSlabs},
         wide::{
             WIDTH, WideNode,
-            packet::{Entry, GROW, PacketTree, Start, Together, range, spreads},
+            packet::{Entry, GROW, PacketTree, Start, Together, spreads},
             walk,
         },
     },
@@ -175,7 +175,7 @@ impl<const K: usize> PacketTree for Wide<K> {
         let together = Packet::<S>::new(packet, active, backward);
         let rays = together.slabs.clipped(&self.bounds);
         let mask = rays.open() & active;
-        let mark = Segment { near: range(&packet.t_near32, active)[0], far: range(&packet.t_cull, active)[1] };
+        let mark = Segment { near: S::range(S::F::load(&packet.t_near32), active)[0], far: S::range(S::F::load(&packet.t_cull), active)[1] };
         let root = (mask != 0).then_some(Entry { word: Self::root(), mask, mark, rays });
         (together, root)
     }

@@ -1,0 +1,362 @@
+//! The nearest hits of a packet by lane: bounds on their t in f32 and where their triangles are. Numbers are rounded at the end, for all rays at once.
+//!
+//! A triangle that is surely hit, by volumes farther from 0 than their errors, and surely before the best so far takes its place by that alone; one that
+//! surely is neither falls away. What is left is tested in f64, and what that leaves in doubt, by integers.
+
+use super::{BOUND32, PACKET, PacketRays, bits, leaf::{Spread, narrow3, wide3, widely}};
+use crate::{
+    accel::{
+        Counter,
+        block::{Evaluated, NO_PRIM, TriBlock, Volumes, Weights},
+        query::{SLACK, round_up},
+    },
+    geom::{
+        Hit, InstanceId, PrimId,
+        exact::{BOUND, RayRange, TriangleHit},
+    },
+    glam::Vec3,
+    simd::{Lanes, Simd, Task},
+};
+
+/// No triangle yet.
+const NOWHERE: u32 = u32::MAX;
+
+/// The best of each ray of a packet.
+pub(in crate::accel) struct Nearest {
+    /// At most the exact t of the best, or infinity. [`PacketRays::t_cull`] is at least that t.
+    low: [f32; PACKET],
+    /// Four times the number of the best's block, and its lane.
+    place: [u32; PACKET],
+}
+
+/// The least f32 above `4 * 2^-23`, what the roundings of t amount to.
+const ROUNDING: f32 = 4.0 * f32::EPSILON;
+
+impl Nearest {
+    /// Nothing hit yet.
+    pub(in crate::accel) const NONE: Self = Self { low: [f32::INFINITY; PACKET], place: [NOWHERE; PACKET] };
+
+    /// Offers the triangles of block `number` to the active rays.
+    #[inline(always)]
+    pub(in crate::accel) fn offer<S: Simd, C: Counter>(
+        &mut self,
+        packet: &mut PacketRays,
+        blocks: &[TriBlock],
+        number: usize,
+        active: u32,
+        count: &mut C,
+    ) {
+        count.block();
+        let block = &blocks[number];
+        let mut tri = Spread::EMPTY;
+        tri.fill::<S>(block, packet);
+        let lines = [narrow3::<S>(&packet.origin32), narrow3::<S>(&packet.dir32)];
+        for lane in 0..4 {
+            if block.prim(lane) == NO_PRIM {
+                break;
+            }
+            let (volumes, open) = tri.test(lane, lines, packet.common_origin);
+            let open = open & active;
+            if open == 0 {
+                continue;
+            }
+            let bounded = tri.bounded::<S::F>(lane, volumes);
+            let (near, limit) = (S::F::load(&packet.t_near32), S::F::load(&packet.t_cull));
+            let beyond = bounded.solid & (limit.lt(bounded.t_low) | bounded.t_high.lt(near));
+            let open = open & !beyond;
+            if open == 0 {
+                continue;
+            }
+            let low = S::F::load(&self.low);
+            let before = bounded.t_high.lt(low) & bounded.t_high.le(S::F::load(&packet.t_far));
+            let sure = open & bounded.sure & near.le(bounded.t_low) & before;
+            #[expect(clippy::cast_possible_truncation, reason = "there are fewer than 2^28 blocks")]
+            let place = (4 * number + lane) as u32;
+            if sure != 0 {
+                S::F::select(sure, bounded.t_low, low).store(&mut self.low);
+                S::F::select(sure, bounded.t_high, limit).store(&mut packet.t_cull);
+                S::write_where(sure, place, &mut self.place);
+            }
+            let doubtful = open & !sure;
+            if doubtful != 0 {
+                S::call(Settle { nearest: self, packet, blocks, place, doubtful });
+            }
+        }
+    }
+
+    /// Decides between the best of a ray and another triangle by exact numbers.
+    #[cold]
+    #[inline(never)]
+    fn decide(&mut self, packet: &mut PacketRays, blocks: &[TriBlock], i: usize, place: u32) {
+        let ray = packet.range(i);
+        let (corners, prim) = triangle(blocks, place);
+        let Some(hit) = TriangleHit::test(&ray, corners) else { return };
+        if self.place[i] != NOWHERE {
+            let (corners, best) = triangle(blocks, self.place[i]);
+            if let Some(other) = TriangleHit::test(&ray, corners)
+                && hit.cmp_t(&other, &ray).then(prim.cmp(&best)).is_gt()
+            {
+                return;
+            }
+        }
+        self.keep(packet, i, place, [hit.t_low, hit.t_high]);
+    }
+
+    #[inline(always)]
+    fn keep(&mut self, packet: &mut PacketRays, i: usize, place: u32, [low, high]: [f64; 2]) {
+        self.low[i] = -round_up(-low);
+        packet.t_cull[i] = round_up(high);
+        self.place[i] = place;
+    }
+
+    /// The bits of the rays that hit something.
+    #[inline(always)]
+    fn found(&self) -> u32 {
+        let mut found = 0;
+        for (i, &place) in self.place.iter().enumerate() {
+            found |= u32::from(place != NOWHERE) << i;
+        }
+        found
+    }
+
+    /// The hits of all rays, rounded, into `out`.
+    #[inline(always)]
+    pub(in crate::accel) fn answer<S: Simd>(
+        &self,
+        packet: &PacketRays,
+        blocks: &[TriBlock],
+        out: &mut [Option<Hit>],
+    ) {
+        let found = self.found() & (u32::MAX >> (32 - out.len()));
+        out.fill(None);
+        if found == 0 {
+            return;
+        }
+        let mut corners = [[[0.0; PACKET]; 3]; 3];
+        let mut prims = [PrimId(0); PACKET];
+        for i in bits(found) {
+            let i = i % PACKET;
+            let place = self.place[i] as usize;
+            prims[i] = blocks[place / 4].spread(place % 4, &mut corners, i);
+        }
+        let mut tuv = [[0.0; PACKET]; 3];
+        let mut rounded = 0;
+        for first in (0..S::F::LEN).step_by(S::D::LEN) {
+            let part = found >> first & S::D::ALL;
+            if part != 0 {
+                rounded |= round::<S>(packet, &corners, first, part, &mut tuv) << first;
+            }
+        }
+        let [t, u, v] = &tuv;
+        for i in bits(found & rounded) {
+            let i = i % PACKET;
+            out[i] = Some(Hit { t: t[i], u: u[i], v: v[i], prim: prims[i], instance: InstanceId(0) });
+        }
+        for i in bits(found & !rounded) {
+            out[i] = exactly(packet, blocks, i, self.place[i]);
+        }
+    }
+}
+
+fn triangle(blocks: &[TriBlock], place: u32) -> ([Vec3; 3], PrimId) {
+    let (block, lane) = (&blocks[place as usize / 4], place as usize % 4);
+    (block.corners(lane), PrimId(block.prim(lane)))
+}
+
+#[cold]
+#[inline(never)]
+fn exactly(packet: &PacketRays, blocks: &[TriBlock], i: usize, place: u32) -> Option<Hit> {
+    let (corners, prim) = triangle(blocks, place);
+    let range = packet.range(i);
+    let [t, u, v] = TriangleHit::test(&range, corners)?.tuv(&range);
+    Some(Hit { t, u, v, prim, instance: InstanceId(0) })
+}
+
+/// Rounds t, u and v of the rays in `part`, counted from number `first` on, and their triangles: the rays whose numbers f64 settles.
+#[inline(always)]
+fn round<S: Simd>(
+    packet: &PacketRays,
+    corners: &[[[f32; PACKET]; 3]; 3],
+    first: usize,
+    part: u32,
+    tuv: &mut [[f32; PACKET]; 3],
+) -> u32 {
+    let [a, b, c] = corners;
+    let triangles = [wide3::<S>(a, first), wide3::<S>(b, first), wide3::<S>(c, first)];
+    let volumes = Volumes::new(triangles, wide3::<S>(&packet.origin32, first), wide3::<S>(&packet.dir32, first));
+    let (t_near, t_far) = (S::load_wide(&packet.t_near32[first..]), S::load_wide(&packet.t_far[first..]));
+    let scale = S::load_wide(&packet.scale[first..]) * S::D::splat(BOUND);
+    let weights = Weights { scale, t_near, t_far, t_limit: t_far };
+    let evaluated = Evaluated::new(&volumes, part, &weights);
+    let [t_low, t_high, inv_det, u, v, det_error, uv_error] = evaluated.rows;
+    let [t_row, u_row, v_row] = tuv;
+    let mut agreed = evaluated.sure & S::agreed(t_low, t_high, &mut t_row[first..]);
+    let (q, slack) = quotient([u, uv_error], inv_det, det_error);
+    agreed &= S::agreed(q - slack, q + slack, &mut u_row[first..]);
+    let (q, slack) = quotient([v, uv_error], inv_det, det_error);
+    agreed & S::agreed(q - slack, q + slack, &mut v_row[first..])
+}
+
+/// As [`Quotients`](crate::geom::exact::Quotients): a volume over D, and a bound on its error.
+#[inline(always)]
+fn quotient<L: Lanes<Elem = f64>>([volume, error]: [L; 2], inv_det: L, det_error: L) -> (L, L) {
+    let q = volume * inv_det;
+    let slack = q.abs().mul_add_loose(det_error, error) * inv_det.abs() * L::splat(2.0);
+    (q, q.abs().mul_add_loose(L::splat(4.0 * f64::EPSILON), slack))
+}
+
+/// What f32 makes of the volumes of a triangle and its rays.
+struct Bounded<L> {
+    t_low: L,
+    t_high: L,
+    /// Rays whose t is bounded.
+    solid: u32,
+    /// Rays that surely meet the triangle and whose t is bounded.
+    sure: u32,
+}
+
+impl Spread {
+    /// As [`Quotients`](crate::geom::exact::Quotients) in f32; [`SLACK`] is above what underflow takes.
+    #[inline(always)]
+    fn bounded<L: Lanes<Elem = f32>>(&self, lane: usize, [det, u, v, t]: [L; 4]) -> Bounded<L> {
+        let [uv_error, det_error, t_error] = self.errors(lane);
+        let w = det - u - v;
+        let (error, det_error) = (L::splat(uv_error), L::splat(det_error));
+        let inside = error.lt(u.min(v).min(w)) | u.max(v).max(w).lt(-error);
+        let solid = (det_error * L::splat(4.0)).le(det.abs());
+        let inv_det = L::splat(1.0) / det;
+        let t = t * inv_det;
+        let slack = t.abs().mul_add_loose(det_error, L::splat(t_error)) * inv_det.abs() * L::splat(2.0);
+        let slack = t.abs().mul_add_loose(L::splat(ROUNDING), slack) + L::splat(SLACK);
+        Bounded { t_low: t - slack, t_high: t + slack, solid, sure: solid & inside }
+    }
+}
+
+/// Tests one triangle against rays that f32 leaves in doubt.
+struct Settle<'a> {
+    nearest: &'a mut Nearest,
+    packet: &'a mut PacketRays,
+    blocks: &'a [TriBlock],
+    place: u32,
+    doubtful: u32,
+}
+
+impl Task for Settle<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self) {
+        let Self { nearest, packet, blocks, place, doubtful } = self;
+        let (block, lane) = (&blocks[place as usize / 4], place as usize % 4);
+        for first in (0..S::F::LEN).step_by(S::D::LEN) {
+            let part = doubtful >> first & S::D::ALL;
+            if part == 0 {
+                continue;
+            }
+            let evaluated = widely::<S>(block, lane, packet, first, part);
+            let (mut low, mut high) = ([0.0; 8], [0.0; 8]);
+            evaluated.rows[0].store(&mut low);
+            evaluated.rows[1].store(&mut high);
+            for bit in bits(evaluated.mask) {
+                let (i, bit) = ((first + bit) % PACKET, bit % 8);
+                if evaluated.sure >> bit & 1 == 1 && high[bit] < f64::from(nearest.low[i]) {
+                    nearest.keep(packet, i, place, [low[bit], high[bit]]);
+                } else if evaluated.sure >> bit & 1 == 0 || low[bit] <= f64::from(packet.t_cull[i]) {
+                    nearest.decide(packet, blocks, i, place);
+                }
+            }
+        }
+    }
+}
+
+impl PacketRays {
+    /// A ray by itself.
+    fn range(&self, i: usize) -> RayRange {
+        let [[ox, oy, oz], [dx, dy, dz]] = [&self.origin32, &self.dir32];
+        RayRange {
+            origin: Vec3::new(ox[i], oy[i], oz[i]),
+            t_near: self.t_near32[i],
+            dir: Vec3::new(dx[i], dy[i], dz[i]),
+            t_far: self.t_far[i],
+        }
+    }
+}
+
+impl TriBlock {
+    /// Writes the corners of a triangle to lane i of their rows: its number.
+    #[inline(always)]
+    fn spread(&self, lane: usize, rows: &mut [[[f32; PACKET]; 3]; 3], i: usize) -> PrimId {
+        for (to, from) in rows.iter_mut().zip(self.corners_by_axis()) {
+            for (row, numbers) in to.iter_mut().zip(from) {
+                row[i] = numbers[lane];
+            }
+        }
+        PrimId(self.prim(lane))
+    }
+}
+
+impl TriBlock {
+    /// The active rays that a triangle of the block blocks.
+    #[inline(always)]
+    pub(in crate::accel) fn blocked<S: Simd>(&self, packet: &PacketRays, active: u32) -> u32 {
+        let mut tri = Spread::EMPTY;
+        tri.fill::<S>(self, packet);
+        let lines = [narrow3::<S>(&packet.origin32), narrow3::<S>(&packet.dir32)];
+        let mut left = active;
+        for lane in 0..4 {
+            if self.prim(lane) == NO_PRIM {
+                break;
+            }
+            let (volumes, open) = tri.test(lane, lines, packet.common_origin);
+            let open = open & left;
+            if open == 0 {
+                continue;
+            }
+            let bounded = tri.bounded::<S::F>(lane, volumes);
+            let (near, far) = (S::F::load(&packet.t_near32), S::F::load(&packet.t_far));
+            let sure = open & bounded.sure & near.le(bounded.t_low) & bounded.t_high.le(far);
+            left &= !sure;
+            let beyond = bounded.solid & (far.lt(bounded.t_low) | bounded.t_high.lt(near));
+            let doubtful = open & !(sure | beyond);
+            if doubtful != 0 {
+                left &= !S::call(Doubt { block: self, lane, packet, doubtful });
+            }
+            if left == 0 {
+                break;
+            }
+        }
+        active & !left
+    }
+}
+
+/// Tests one triangle against rays that f32 leaves in doubt: those that it blocks.
+struct Doubt<'a> {
+    block: &'a TriBlock,
+    lane: usize,
+    packet: &'a PacketRays,
+    doubtful: u32,
+}
+
+impl Task for Doubt<'_> {
+    type Output = u32;
+
+    #[inline(always)]
+    fn run<S: Simd>(self) -> u32 {
+        let Self { block, lane, packet, doubtful } = self;
+        let mut blocked = 0;
+        for first in (0..S::F::LEN).step_by(S::D::LEN) {
+            let part = doubtful >> first & S::D::ALL;
+            if part == 0 {
+                continue;
+            }
+            let evaluated = widely::<S>(block, lane, packet, first, part);
+            blocked |= (evaluated.mask & evaluated.sure) << first;
+            for bit in bits(evaluated.mask & !evaluated.sure) {
+                let i = (first + bit) % PACKET;
+                let hit = TriangleHit::exactly(&packet.range(i), block.corners(lane));
+                blocked |= u32::from(hit.is_some()) << i;
+            }
+        }
+        blocked
+    }
+}

@@ -1,0 +1,158 @@
+//! Rays that are close together, from their records to their answers by lane: what each of them would need by itself is had for all at once.
+
+use super::{
+    Place,
+    packet::{Entry, PacketTree, Stack, Together, descend},
+};
+use crate::{
+    accel::{
+        packet::{Nearest, PacketRays, bits},
+        run,
+    },
+    geom::{Forms, Hit, Precision, Ray, Triangles},
+    simd::{Lanes, Simd},
+};
+
+/// Up to this many rays are walked one by one.
+const FEW: u32 = 2;
+
+/// As [`Accel::closest_all`](crate::accel::Accel::closest_all), each `packet` rays together.
+#[inline(always)]
+pub(in crate::accel) fn closest<S: Simd, T: PacketTree>(
+    tree: &T,
+    prims: &Triangles<'_>,
+    rays: &[Ray],
+    packet: usize,
+    forms: Forms,
+    out: &mut [Option<Hit>],
+) {
+    let mut lines = PacketRays::EMPTY;
+    for (rays, out) in rays.chunks(packet).zip(out.chunks_mut(packet)) {
+        for (rays, out) in rays.chunks(S::F::LEN).zip(out.chunks_mut(S::F::LEN)) {
+            let mut left = lines.load::<S>(rays, tree.reach(), forms);
+            let mut single = !left;
+            let mut nearest = Nearest::NONE;
+            while left != 0 {
+                let (members, backward) = lines.group(left);
+                left &= !members;
+                if members.count_ones() <= FEW {
+                    single |= members;
+                } else {
+                    let (together, root) = tree.start::<S>(&lines, (members, backward), Precision::Exact);
+                    if let Some(root) = root {
+                        closest_below::<S, T, _>(tree, together, root, &mut lines, &mut nearest);
+                    }
+                }
+            }
+            nearest.answer::<S>(&lines, tree.blocks(), out);
+            for i in bits(single & (u32::MAX >> (32 - rays.len()))) {
+                out[i] = run::closest_one::<S, T>(tree, prims, &rays[i], forms);
+            }
+        }
+    }
+}
+
+/// As [`Accel::occluded_all`](crate::accel::Accel::occluded_all), each `packet` rays together.
+#[inline(always)]
+pub(in crate::accel) fn occluded<S: Simd, T: PacketTree>(
+    tree: &T,
+    prims: &Triangles<'_>,
+    rays: &[Ray],
+    packet: usize,
+    forms: Forms,
+    out: &mut [bool],
+) {
+    let mut lines = PacketRays::EMPTY;
+    for (rays, out) in rays.chunks(packet).zip(out.chunks_mut(packet)) {
+        for (rays, out) in rays.chunks(S::F::LEN).zip(out.chunks_mut(S::F::LEN)) {
+            let mut left = lines.load::<S>(rays, tree.reach(), forms);
+            let mut single = !left;
+            let mut blocked = 0;
+            while left != 0 {
+                let (members, backward) = lines.group(left);
+                left &= !members;
+                if members.count_ones() <= FEW {
+                    single |= members;
+                } else {
+                    let (together, root) = tree.start::<S>(&lines, (members, backward), Precision::Exact);
+                    if let Some(root) = root {
+                        blocked |= occluded_below::<S, T, _>(tree, &together, root, &lines);
+                    }
+                }
+            }
+            for (i, out) in out.iter_mut().enumerate() {
+                *out = blocked >> i & 1 == 1;
+            }
+            for i in bits(single & (u32::MAX >> (32 - rays.len()))) {
+                out[i] = run::occluded_one::<S, T>(tree, prims, &rays[i], forms);
+            }
+        }
+    }
+}
+
+/// Offers the triangles below a node to the rays of a packet.
+#[inline(always)]
+fn closest_below<S: Simd, T: PacketTree, P: Together<S, T>>(
+    tree: &T,
+    mut together: P,
+    start: Entry<S, T, P>,
+    lines: &mut PacketRays,
+    nearest: &mut Nearest,
+) {
+    let mut kids = P::kids();
+    let mut stack = Stack::<S, T, P>::new();
+    stack.push(start);
+    while let Some(mut entry) = stack.pop() {
+        let mask = entry.mask & together.reopened(&mut entry.rays);
+        if mask == 0 {
+            continue;
+        }
+        if entry.word.is_leaf() {
+            let blocks = tree.leaf_blocks(entry.word, &mut ());
+            for (number, block) in (entry.word.index()..).zip(blocks) {
+                let mask = mask & together.meeting(block, &entry.rays);
+                if mask != 0 {
+                    nearest.offer::<S, _>(lines, tree.blocks(), number, mask, &mut ());
+                }
+            }
+            together.limit(lines);
+        } else {
+            descend(&together, tree.node(entry.word.index()), (mask, entry.mark, &entry.rays), &mut kids, &mut stack);
+        }
+    }
+}
+
+/// The rays of the start that something blocks.
+#[inline(always)]
+fn occluded_below<S: Simd, T: PacketTree, P: Together<S, T>>(
+    tree: &T,
+    together: &P,
+    start: Entry<S, T, P>,
+    lines: &PacketRays,
+) -> u32 {
+    let mut kids = P::kids();
+    let mut stack = Stack::<S, T, P>::new();
+    let active = start.mask;
+    let mut open = active;
+    stack.push(start);
+    while let Some(entry) = stack.pop() {
+        let mask = entry.mask & open;
+        if mask == 0 {
+            continue;
+        }
+        if entry.word.is_leaf() {
+            for block in tree.leaf_blocks(entry.word, &mut ()) {
+                let mask = mask & open & together.meeting(block, &entry.rays);
+                if mask != 0 {
+                    open &= !block.blocked::<S>(lines, mask);
+                }
+            }
+            if open == 0 {
+                break;
+            }
+        } else {
+            descend(together, tree.node(entry.word.index()), (mask, entry.mark, &entry.rays), &mut kids, &mut stack);
+        }
+    }
+    active & !open
+}
