@@ -31,7 +31,7 @@ use crate::{
 type Rows3 = [[f32; 4]; 3];
 
 /// What the four triangles of a block have for every ray of a packet, in f32.
-pub(super) struct Spread {
+pub(in crate::accel) struct Spread {
     n: Rows3,
     /// For a common origin `e2 x s` and `s x e1`, else e2 and e1.
     to_u: Rows3,
@@ -54,7 +54,7 @@ fn store3<L: Lanes<Elem = f32>>(lanes: [L; 3], rows: &mut Rows3) {
 
 impl Spread {
     /// Filled in place by [`Spread::fill`]: a struct of this size made elsewhere would be copied.
-    pub(super) const EMPTY: Self = Self {
+    pub(in crate::accel) const EMPTY: Self = Self {
         n: [[0.0; 4]; 3],
         to_u: [[0.0; 4]; 3],
         to_v: [[0.0; 4]; 3],

@@ -6,6 +6,7 @@ mod nearest;
 mod records;
 
 pub(crate) use boxes::PacketBoxes;
+pub(in crate::accel) use leaf::Spread;
 pub(in crate::accel) use nearest::Nearest;
 
 use super::{Closest, TravRay};

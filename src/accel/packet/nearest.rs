@@ -6,7 +6,6 @@
 use super::{BOUND32, PACKET, PacketRays, bits, leaf::{Spread, narrow3, wide3, widely}};
 use crate::{
     accel::{
-        Counter,
         block::{Evaluated, NO_PRIM, TriBlock, Volumes, Weights},
         query::{SLACK, round_up},
     },
@@ -38,17 +37,15 @@ impl Nearest {
 
     /// Offers the triangles of block `number` to the active rays.
     #[inline(always)]
-    pub(in crate::accel) fn offer<S: Simd, C: Counter>(
+    pub(in crate::accel) fn offer<S: Simd>(
         &mut self,
         packet: &mut PacketRays,
         blocks: &[TriBlock],
         number: usize,
         active: u32,
-        count: &mut C,
+        tri: &mut Spread,
     ) {
-        count.block();
         let block = &blocks[number];
-        let mut tri = Spread::EMPTY;
         tri.fill::<S>(block, packet);
         let lines = [narrow3::<S>(&packet.origin32), narrow3::<S>(&packet.dir32)];
         for lane in 0..4 {
@@ -113,8 +110,8 @@ impl Nearest {
     #[inline(always)]
     fn found(&self) -> u32 {
         let mut found = 0;
-        for (i, &place) in self.place.iter().enumerate() {
-            found |= u32::from(place != NOWHERE) << i;
+        for i in 0..PACKET {
+            found |= u32::from(self.place[i] != NOWHERE) << i;
         }
         found
     }
@@ -128,8 +125,8 @@ impl Nearest {
         out: &mut [Option<Hit>],
     ) {
         let found = self.found() & (u32::MAX >> (32 - out.len()));
-        out.fill(None);
         if found == 0 {
+            out.fill(None);
             return;
         }
         let mut corners = [[[0.0; PACKET]; 3]; 3];
@@ -148,9 +145,9 @@ impl Nearest {
             }
         }
         let [t, u, v] = &tuv;
-        for i in bits(found & rounded) {
-            let i = i % PACKET;
-            out[i] = Some(Hit { t: t[i], u: u[i], v: v[i], prim: prims[i], instance: InstanceId(0) });
+        for i in 0..out.len().min(PACKET) {
+            let hit = Hit { t: t[i], u: u[i], v: v[i], prim: prims[i], instance: InstanceId(0) };
+            out[i] = if found >> i & 1 == 1 { Some(hit) } else { None };
         }
         for i in bits(found & !rounded) {
             out[i] = exactly(packet, blocks, i, self.place[i]);
@@ -286,9 +283,10 @@ impl TriBlock {
     /// Writes the corners of a triangle to lane i of their rows: its number.
     #[inline(always)]
     fn spread(&self, lane: usize, rows: &mut [[[f32; PACKET]; 3]; 3], i: usize) -> PrimId {
-        for (to, from) in rows.iter_mut().zip(self.corners_by_axis()) {
-            for (row, numbers) in to.iter_mut().zip(from) {
-                row[i] = numbers[lane];
+        let corners = self.corners_by_axis();
+        for corner in 0..3 {
+            for axis in 0..3 {
+                rows[corner][axis][i] = corners[corner][axis][lane];
             }
         }
         PrimId(self.prim(lane))
@@ -298,8 +296,7 @@ impl TriBlock {
 impl TriBlock {
     /// The active rays that a triangle of the block blocks.
     #[inline(always)]
-    pub(in crate::accel) fn blocked<S: Simd>(&self, packet: &PacketRays, active: u32) -> u32 {
-        let mut tri = Spread::EMPTY;
+    pub(in crate::accel) fn blocked<S: Simd>(&self, packet: &PacketRays, active: u32, tri: &mut Spread) -> u32 {
         tri.fill::<S>(self, packet);
         let lines = [narrow3::<S>(&packet.origin32), narrow3::<S>(&packet.dir32)];
         let mut left = active;

@@ -6,7 +6,7 @@ use super::{
 };
 use crate::{
     accel::{
-        packet::{Nearest, PacketRays, bits},
+        packet::{Nearest, PacketRays, Spread, bits},
         run,
     },
     geom::{Forms, Hit, Precision, Ray, Triangles},
@@ -26,28 +26,32 @@ pub(in crate::accel) fn closest<S: Simd, T: PacketTree>(
     forms: Forms,
     out: &mut [Option<Hit>],
 ) {
-    let mut lines = PacketRays::EMPTY;
-    for (rays, out) in rays.chunks(packet).zip(out.chunks_mut(packet)) {
-        for (rays, out) in rays.chunks(S::F::LEN).zip(out.chunks_mut(S::F::LEN)) {
-            let mut left = lines.load::<S>(rays, tree.reach(), forms);
-            let mut single = !left;
-            let mut nearest = Nearest::NONE;
-            while left != 0 {
-                let (members, backward) = lines.group(left);
-                left &= !members;
-                if members.count_ones() <= FEW {
-                    single |= members;
-                } else {
-                    let (together, root) = tree.start::<S>(&lines, (members, backward), Precision::Exact);
-                    if let Some(root) = root {
-                        closest_below::<S, T, _>(tree, together, root, &mut lines, &mut nearest);
-                    }
+    let (mut lines, mut tri) = (PacketRays::EMPTY, Spread::EMPTY);
+    let (mut at, mut end) = (0, 0);
+    while at < rays.len() {
+        // The rest of a packet that is longer than a vector follows by itself.
+        end = if at == end { rays.len().min(at + packet) } else { end };
+        let next = end.min(at + S::F::LEN);
+        let (rays, out) = (&rays[at..next], &mut out[at..next]);
+        at = next;
+        let mut left = lines.load::<S>(rays, tree.reach(), forms);
+        let mut single = !left;
+        let mut nearest = Nearest::NONE;
+        while left != 0 {
+            let (members, backward) = lines.group(left);
+            left &= !members;
+            if members.count_ones() <= FEW {
+                single |= members;
+            } else {
+                let (together, root) = tree.start::<S>(&lines, (members, backward), Precision::Exact);
+                if let Some(root) = root {
+                    closest_below::<S, T, _>(tree, together, root, &mut lines, &mut nearest, &mut tri);
                 }
             }
-            nearest.answer::<S>(&lines, tree.blocks(), out);
-            for i in bits(single & (u32::MAX >> (32 - rays.len()))) {
-                out[i] = run::closest_one::<S, T>(tree, prims, &rays[i], forms);
-            }
+        }
+        nearest.answer::<S>(&lines, tree.blocks(), out);
+        for i in bits(single & (u32::MAX >> (32 - rays.len()))) {
+            out[i] = run::closest_one::<S, T>(tree, prims, &rays[i], forms);
         }
     }
 }
@@ -62,30 +66,34 @@ pub(in crate::accel) fn occluded<S: Simd, T: PacketTree>(
     forms: Forms,
     out: &mut [bool],
 ) {
-    let mut lines = PacketRays::EMPTY;
-    for (rays, out) in rays.chunks(packet).zip(out.chunks_mut(packet)) {
-        for (rays, out) in rays.chunks(S::F::LEN).zip(out.chunks_mut(S::F::LEN)) {
-            let mut left = lines.load::<S>(rays, tree.reach(), forms);
-            let mut single = !left;
-            let mut blocked = 0;
-            while left != 0 {
-                let (members, backward) = lines.group(left);
-                left &= !members;
-                if members.count_ones() <= FEW {
-                    single |= members;
-                } else {
-                    let (together, root) = tree.start::<S>(&lines, (members, backward), Precision::Exact);
-                    if let Some(root) = root {
-                        blocked |= occluded_below::<S, T, _>(tree, &together, root, &lines);
-                    }
+    let (mut lines, mut tri) = (PacketRays::EMPTY, Spread::EMPTY);
+    let (mut at, mut end) = (0, 0);
+    while at < rays.len() {
+        // The rest of a packet that is longer than a vector follows by itself.
+        end = if at == end { rays.len().min(at + packet) } else { end };
+        let next = end.min(at + S::F::LEN);
+        let (rays, out) = (&rays[at..next], &mut out[at..next]);
+        at = next;
+        let mut left = lines.load::<S>(rays, tree.reach(), forms);
+        let mut single = !left;
+        let mut blocked = 0;
+        while left != 0 {
+            let (members, backward) = lines.group(left);
+            left &= !members;
+            if members.count_ones() <= FEW {
+                single |= members;
+            } else {
+                let (together, root) = tree.start::<S>(&lines, (members, backward), Precision::Exact);
+                if let Some(root) = root {
+                    blocked |= occluded_below::<S, T, _>(tree, &together, root, &lines, &mut tri);
                 }
             }
-            for (i, out) in out.iter_mut().enumerate() {
-                *out = blocked >> i & 1 == 1;
-            }
-            for i in bits(single & (u32::MAX >> (32 - rays.len()))) {
-                out[i] = run::occluded_one::<S, T>(tree, prims, &rays[i], forms);
-            }
+        }
+        for (i, out) in out.iter_mut().enumerate() {
+            *out = blocked >> i & 1 == 1;
+        }
+        for i in bits(single & (u32::MAX >> (32 - rays.len()))) {
+            out[i] = run::occluded_one::<S, T>(tree, prims, &rays[i], forms);
         }
     }
 }
@@ -98,6 +106,7 @@ fn closest_below<S: Simd, T: PacketTree, P: Together<S, T>>(
     start: Entry<S, T, P>,
     lines: &mut PacketRays,
     nearest: &mut Nearest,
+    tri: &mut Spread,
 ) {
     let mut kids = P::kids();
     let mut stack = Stack::<S, T, P>::new();
@@ -112,7 +121,7 @@ fn closest_below<S: Simd, T: PacketTree, P: Together<S, T>>(
             for (number, block) in (entry.word.index()..).zip(blocks) {
                 let mask = mask & together.meeting(block, &entry.rays);
                 if mask != 0 {
-                    nearest.offer::<S, _>(lines, tree.blocks(), number, mask, &mut ());
+                    nearest.offer::<S>(lines, tree.blocks(), number, mask, tri);
                 }
             }
             together.limit(lines);
@@ -129,6 +138,7 @@ fn occluded_below<S: Simd, T: PacketTree, P: Together<S, T>>(
     together: &P,
     start: Entry<S, T, P>,
     lines: &PacketRays,
+    tri: &mut Spread,
 ) -> u32 {
     let mut kids = P::kids();
     let mut stack = Stack::<S, T, P>::new();
@@ -144,7 +154,7 @@ fn occluded_below<S: Simd, T: PacketTree, P: Together<S, T>>(
             for block in tree.leaf_blocks(entry.word, &mut ()) {
                 let mask = mask & open & together.meeting(block, &entry.rays);
                 if mask != 0 {
-                    open &= !block.blocked::<S>(lines, mask);
+                    open &= !block.blocked::<S>(lines, mask, tri);
                 }
             }
             if open == 0 {

@@ -1,7 +1,5 @@
 //! The walk of packets: the children of a node against all rays at once, then the rays against each child that is left.
 
-use arrayvec::ArrayVec;
-
 use super::{Place, Tree, WIDTH, WideNode, Word};
 use crate::{
     accel::{
@@ -12,7 +10,7 @@ use crate::{
         topology::MAX_DEPTH,
     },
     geom::{Precision, Triangles},
-    simd::{Lanes, Simd},
+    simd::{self, Lanes, Simd},
 };
 
 /// Up to this many rays are walked one by one.
@@ -72,6 +70,15 @@ pub(in crate::accel) struct Entry<S: Simd, T: Tree, P: Together<S, T>> {
     pub(in crate::accel) mark: P::Mark,
     pub(in crate::accel) rays: P::Rays,
 }
+
+impl<S: Simd, T: Tree, P: Together<S, T>> Clone for Entry<S, T, P> {
+    #[inline(always)]
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<S: Simd, T: Tree, P: Together<S, T>> Copy for Entry<S, T, P> {}
 
 /// A packet, and the root for those of its rays that may meet it.
 pub(in crate::accel) type Start<S, T> =
@@ -149,7 +156,7 @@ pub(in crate::accel) fn occluded_packet<S: Simd, T: PacketTree, C: Counter, H: H
 }
 
 /// Nodes to visit, the next last.
-pub(super) type Stack<S, T, P> = ArrayVec<Entry<S, T, P>, { MAX_DEPTH * (WIDTH - 1) + 1 }>;
+pub(super) type Stack<S, T, P> = simd::Stack<Entry<S, T, P>, { MAX_DEPTH * (WIDTH - 1) + 1 }>;
 
 /// Puts the children that rays of an entry meet on the stack, nearest last.
 #[inline(always)]
