@@ -8,7 +8,7 @@ use super::{
     packet::met_together,
 };
 use crate::{
-    accel::{Accel, AccelKind, AnyHit, Closest, Forms, TravRay, slabs, wide::WIDTH},
+    accel::{Accel, AccelKind, AnyHit, Closest, Forms, PACKET, TravRay, slabs, wide::WIDTH},
     geom::{Aabb, Hit, Ray, Triangles},
     simd::{Simd, SimdLevel, Task, dispatch},
 };
@@ -133,49 +133,61 @@ impl Task for Alone<'_> {
     }
 }
 
-/// The same of many rays.
-struct InFlight<'a> {
+/// The same of many rays, together or not.
+struct Batch<'a> {
     tree: &'a Bvh8,
     prims: &'a Triangles<'a>,
     rays: &'a [Ray],
+    packet: usize,
 }
 
-impl Task for InFlight<'_> {
+impl Task for Batch<'_> {
     type Output = (Vec<Option<Hit>>, Vec<bool>);
 
     #[inline(always)]
     fn run<S: Simd>(self) -> Self::Output {
-        let Self { tree, prims, rays } = self;
+        let Self { tree, prims, rays, packet } = self;
         let (mut hits, mut blocked) = (vec![None; rays.len()], vec![false; rays.len()]);
-        tree.closest_all::<S>(prims, rays, Forms::EXACT, &mut hits);
-        tree.occluded_all::<S>(prims, rays, Forms::EXACT, &mut blocked);
+        tree.closest_all::<S>(prims, rays, packet, Forms::EXACT, &mut hits);
+        tree.occluded_all::<S>(prims, rays, packet, Forms::EXACT, &mut blocked);
         (hits, blocked)
     }
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 200, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 600, failure_persistence: None, ..ProptestConfig::default() })]
 
     /// Some rays run along axes, some are too steep for f32, some are none.
     #[test]
-    fn rays_in_flight_find_what_each_finds_alone(
+    fn batches_of_rays_find_what_each_finds_alone(
         corners in prop::collection::vec(prop::array::uniform3(prop::array::uniform3(-8_i8..8)), 0..80),
         rays in prop::collection::vec(
-            (prop::array::uniform3(-12_i8..12), prop::array::uniform3(-3_i8..4), prop_oneof![6 => Just(1.0_f32), 1 => Just(1e-30), 1 => Just(f32::NAN)]),
-            0..40,
+            (prop::array::uniform3(-12_i8..12), prop::array::uniform3(-3_i8..4), prop_oneof![12 => Just(1.0_f32), 1 => Just(1e-30), 1 => Just(f32::NAN)]),
+            0..60,
         ),
+        start in prop::option::of(prop::array::uniform3(-12_i8..12)),
+        tilt in prop::option::of(prop::array::uniform3(2.0_f32..9.0)),
+        range in prop_oneof![Just([0.0, f32::INFINITY]), prop::array::uniform2(0_u8..9).prop_map(|t| t.map(|t| f32::from(t) * 0.5))],
     ) {
         let point = |p: [i8; 3]| Vec3::from(p.map(f32::from)) * 0.5;
         let positions: Vec<_> = corners.iter().flatten().map(|&p| point(p)).collect();
         let indices: Vec<_> = (0..).step_by(3).take(corners.len()).map(|i| [i, i + 1, i + 2]).collect();
         let prims = Triangles { positions: &positions, indices: &indices, topology_epoch: 0 };
         let tree = Bvh8::build(&prims, &Bvh8Config::default()).unwrap();
-        let rays: Vec<_> = rays.iter().map(|&(o, d, scale)| Ray::new(point(o), point(d) * scale)).collect();
+        // All from one point, or into one octant, or neither.
+        let ray = |&(o, d, scale): &([i8; 3], [i8; 3], f32)| {
+            let origin = point(start.unwrap_or(o));
+            let dir = point(d) + tilt.map_or(Vec3::ZERO, Vec3::from);
+            Ray { t_near: range[0], t_far: range[1], ..Ray::new(origin, dir * scale) }
+        };
+        let rays: Vec<_> = rays.iter().map(ray).collect();
         for level in SimdLevel::available() {
-            let (hits, blocked) = dispatch(level, InFlight { tree: &tree, prims: &prims, rays: &rays });
-            for (i, ray) in rays.iter().enumerate() {
-                let alone = TravRay::new(ray).map(|ray| dispatch(level, Alone { tree: &tree, prims: &prims, ray: &ray }));
-                prop_assert_eq!((hits[i], blocked[i]), alone.unwrap_or((None, false)), "{} {:?}", level, ray);
+            for packet in [1, 5, PACKET] {
+                let (hits, blocked) = dispatch(level, Batch { tree: &tree, prims: &prims, rays: &rays, packet });
+                for (i, ray) in rays.iter().enumerate() {
+                    let alone = TravRay::new(ray).map(|ray| dispatch(level, Alone { tree: &tree, prims: &prims, ray: &ray }));
+                    prop_assert_eq!((hits[i], blocked[i]), alone.unwrap_or((None, false)), "{} {} {:?}", level, packet, ray);
+                }
             }
         }
     }

@@ -1,6 +1,6 @@
 //! Rays in, hits out, both as the bytes of their files.
 
-use std::{path::Path, time::Instant};
+use std::{borrow::Cow, path::Path, time::Instant};
 
 use kinora::{
     accel::{AnyAccel, PACKET, Precision},
@@ -68,7 +68,7 @@ impl Queries<'_> {
 
     /// Casts a run of rays on one thread.
     fn cast(&self, records: &[[u8; RAY_BYTES]], out: &mut [[u8; HIT_BYTES]]) -> Result<(), FloatModeError> {
-        let rays: Vec<Ray> = records.iter().map(decode).collect();
+        let rays = decode(records);
         let (prims, simd, forms) = (&self.prims, self.simd, self.precision.into());
         let packet = if self.packet { PACKET } else { 1 };
         if self.any_hit {
@@ -88,8 +88,17 @@ impl Queries<'_> {
     }
 }
 
-#[inline(always)]
-fn decode(record: &[u8; RAY_BYTES]) -> Ray {
+/// The rays of records, which are what they look like in memory where numbers are little-endian and lie at their places.
+fn decode(records: &[[u8; RAY_BYTES]]) -> Cow<'_, [Ray]> {
+    if cfg!(target_endian = "little")
+        && let Ok(rays) = bytemuck::try_cast_slice(records)
+    {
+        return Cow::Borrowed(rays);
+    }
+    Cow::Owned(records.iter().map(decode_one).collect())
+}
+
+fn decode_one(record: &[u8; RAY_BYTES]) -> Ray {
     let words: [[u8; 4]; 8] = bytemuck::cast(*record);
     let number = |i: usize| f32::from_le_bytes(words[i]);
     Ray {

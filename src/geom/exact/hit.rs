@@ -4,6 +4,7 @@ use glam::Vec3;
 
 use super::{
     estimate::{Estimate, Quotients, Verdict},
+    fine,
     volumes::Volumes,
 };
 
@@ -109,6 +110,12 @@ impl TriangleHit {
     #[cold]
     #[inline(never)]
     fn tuv_exactly(&self, ray: &RayRange) -> [f32; 3] {
+        fine::tuv(ray, self.corners).unwrap_or_else(|| self.tuv_by_integers(ray))
+    }
+
+    #[cold]
+    #[inline(never)]
+    pub(super) fn tuv_by_integers(&self, ray: &RayRange) -> [f32; 3] {
         self.volumes(ray).map_or([0.0; 3], |x| [x.t_f32(), x.u_f32(), x.v_f32()])
     }
 }

@@ -9,11 +9,12 @@
 //! ```
 //!
 //! The triangle is hit when D is not 0, none of U, V, W has the sign opposite to D, and t lies in the ray's range.
-//! The volumes are evaluated in f64 with a proven bound; where a sign, a comparison or a rounding is in
-//! doubt, integers decide: the coordinates are multiples of a power of two, so the volumes are integers of at most
+//! The volumes are evaluated in f64 with a proven bound; where a rounding is in doubt, in pairs of f64; where a sign, a comparison or
+//! still a rounding is in doubt, integers decide: the coordinates are multiples of a power of two, so the volumes are integers of at most
 //! 837 bits. Nothing is allocated.
 
 mod estimate;
+mod fine;
 mod hit;
 mod int;
 mod measure;
