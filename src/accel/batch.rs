@@ -1,9 +1,5 @@
 //! Many rays at once: for callers who need no filter and no counts.
 
-use std::ops::Range;
-
-use glam::Vec3A;
-
 use super::{AnyAccel, PACKET};
 use crate::{
     geom::{Forms, Hit, Ray, Triangles},
@@ -51,11 +47,7 @@ impl AnyAccel {
     ) -> Result<(), FloatModeError> {
         assert!((1..=PACKET).contains(&packet), "packets of {packet} rays");
         check_float_mode()?;
-        let out = &mut out[..rays.len()];
-        for (run, together) in runs(rays, packet, self.streams()) {
-            let (rays, out) = (&rays[run.clone()], &mut out[run]);
-            self.closest_all(level, prims, rays, if together { packet } else { 1 }, forms, out);
-        }
+        self.closest_all(level, prims, rays, packet, forms, &mut out[..rays.len()]);
         Ok(())
     }
 
@@ -95,39 +87,7 @@ impl AnyAccel {
     ) -> Result<(), FloatModeError> {
         assert!((1..=PACKET).contains(&packet), "packets of {packet} rays");
         check_float_mode()?;
-        let out = &mut out[..rays.len()];
-        for (run, together) in runs(rays, packet, self.streams()) {
-            let (rays, out) = (&rays[run.clone()], &mut out[run]);
-            self.occluded_all(level, prims, rays, if together { packet } else { 1 }, forms, out);
-        }
+        self.occluded_all(level, prims, rays, packet, forms, &mut out[..rays.len()]);
         Ok(())
     }
-}
-
-/// Splits rays, where packets begin, into runs that go together in packets and runs that do not. With `streams` a structure answers rays apart faster than packets of
-/// rays that point into different directions.
-fn runs(rays: &[Ray], packet: usize, streams: bool) -> impl Iterator<Item = (Range<usize>, bool)> + '_ {
-    let mut at = 0;
-    let together = move |at: usize| packet > 1 && !(streams && points_apart(&rays[at..rays.len().min(at + packet)]));
-    std::iter::from_fn(move || {
-        let first = at;
-        let kind = (first < rays.len()).then(|| together(first))?;
-        while at < rays.len() && together(at) == kind {
-            at = if packet == 1 { rays.len() } else { rays.len().min(at + packet) };
-        }
-        Some((first..at, kind))
-    })
-}
-
-/// Directions of a packet may differ by this part of the longest component.
-const NARROW: f32 = 0.5;
-
-/// True when rays point into too different directions to go together.
-fn points_apart(rays: &[Ray]) -> bool {
-    let (mut low, mut high) = (Vec3A::INFINITY, Vec3A::NEG_INFINITY);
-    for ray in rays {
-        let dir = Vec3A::from(ray.dir);
-        (low, high) = (low.min(dir), high.max(dir));
-    }
-    (high - low).max_element() > NARROW * low.abs().max(high.abs()).max_element()
 }

@@ -167,8 +167,6 @@ pub trait Accel: Sized + Clone + Send + Sync + std::fmt::Debug + 'static {
     type Config: AccelConfig;
     /// False when every refit asks for a rebuild.
     const REFITS: bool = true;
-    /// True when [`Accel::closest_all`] and [`Accel::occluded_all`] are faster than packets of rays that point apart.
-    const STREAMS: bool = false;
     /// What its nodes say about what is below them, for reports.
     const NODE_FORMAT: &'static str = "full boxes";
     /// What a walk leaves for rays that start where it ended; `()` where nothing is gained.
@@ -220,7 +218,7 @@ pub trait Accel: Sized + Clone + Send + Sync + std::fmt::Debug + 'static {
     ) -> bool;
 
     /// The closest hit of every ray into `out`, which is as long, for callers who need no filter and no counts: rays by themselves where `packet` is 1, else
-    /// in packets of up to `packet` consecutive ones.
+    /// in packets of up to `packet` consecutive ones, unless the structure finds that they point apart.
     #[inline(always)]
     fn closest_all<S: Simd>(
         &self,

@@ -129,13 +129,6 @@ macro_rules! register_accels {
                 }
             }
 
-            /// As [`Accel::STREAMS`].
-            pub(super) fn streams(&self) -> bool {
-                match self {
-                    $(Self::$kind(_) => <$ty>::STREAMS,)*
-                }
-            }
-
             /// As [`Accel::NODE_FORMAT`].
             pub fn node_format(&self) -> &'static str {
                 match self {

@@ -34,6 +34,7 @@ use crate::{
     simd::Simd,
 };
 use node::{Link, MAX_BLOCKS, Node};
+use stream::{ClosestApart, OccludedApart};
 
 /// A built hierarchy.
 #[derive(Debug)]
@@ -195,7 +196,6 @@ impl Refittable for Bvh8 {
 
 impl Accel for Bvh8 {
     const NAME: &'static str = "bvh8";
-    const STREAMS: bool = true;
     type Config = Bvh8Config;
     type RayState = ();
 
@@ -255,9 +255,10 @@ impl Accel for Bvh8 {
         out: &mut [Option<Hit>],
     ) {
         if packet == 1 {
-            stream::closest::<S>(self, rays, forms, out);
+            S::call(ClosestApart { tree: self, rays, forms, out });
         } else if forms == Forms::EXACT {
-            coherent::closest::<S, Self>(self, prims, rays, packet, forms, out);
+            let apart = |rays: &[Ray], out: &mut [Option<Hit>]| S::call(ClosestApart { tree: self, rays, forms, out });
+            coherent::closest::<S, Self>(self, prims, rays, packet, forms, out, apart);
         } else {
             run::closest_all::<S, Self>(self, prims, rays, packet, forms, out);
         }
@@ -273,9 +274,10 @@ impl Accel for Bvh8 {
         out: &mut [bool],
     ) {
         if packet == 1 {
-            stream::occluded::<S>(self, rays, forms, out);
+            S::call(OccludedApart { tree: self, rays, forms, out });
         } else if forms == Forms::EXACT {
-            coherent::occluded::<S, Self>(self, prims, rays, packet, forms, out);
+            let apart = |rays: &[Ray], out: &mut [bool]| S::call(OccludedApart { tree: self, rays, forms, out });
+            coherent::occluded::<S, Self>(self, prims, rays, packet, forms, out, apart);
         } else {
             run::occluded_all::<S, Self>(self, prims, rays, packet, forms, out);
         }

@@ -15,7 +15,7 @@ use crate::{
         wide::{Place, WIDTH},
     },
     geom::{Forms, Hit, Ray},
-    simd::{LEAST_KEY, Scalar, Simd, key_floor},
+    simd::{LEAST_KEY, Scalar, Simd, Task, key_floor},
 };
 
 impl Bvh8 {
@@ -138,8 +138,25 @@ impl Waiting<'_> {
 }
 
 /// The closest hit of every ray.
+pub(super) struct ClosestApart<'a> {
+    pub(super) tree: &'a Bvh8,
+    pub(super) rays: &'a [Ray],
+    pub(super) forms: Forms,
+    pub(super) out: &'a mut [Option<Hit>],
+}
+
+impl Task for ClosestApart<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self) {
+        let Self { tree, rays, forms, out } = self;
+        closest::<S>(tree, rays, forms, out);
+    }
+}
+
 #[inline(always)]
-pub(super) fn closest<S: Simd>(tree: &Bvh8, rays: &[Ray], forms: Forms, out: &mut [Option<Hit>]) {
+fn closest<S: Simd>(tree: &Bvh8, rays: &[Ray], forms: Forms, out: &mut [Option<Hit>]) {
     out.fill(None);
     let mut waiting = Waiting { tree, rays, forms, next: 0 };
     let mut flights: [Flight; IN_FLIGHT] = std::array::from_fn(|_| Flight::idle());
@@ -167,8 +184,25 @@ pub(super) fn closest<S: Simd>(tree: &Bvh8, rays: &[Ray], forms: Forms, out: &mu
 }
 
 /// Whether every ray is blocked.
+pub(super) struct OccludedApart<'a> {
+    pub(super) tree: &'a Bvh8,
+    pub(super) rays: &'a [Ray],
+    pub(super) forms: Forms,
+    pub(super) out: &'a mut [bool],
+}
+
+impl Task for OccludedApart<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self) {
+        let Self { tree, rays, forms, out } = self;
+        occluded::<S>(tree, rays, forms, out);
+    }
+}
+
 #[inline(always)]
-pub(super) fn occluded<S: Simd>(tree: &Bvh8, rays: &[Ray], forms: Forms, out: &mut [bool]) {
+fn occluded<S: Simd>(tree: &Bvh8, rays: &[Ray], forms: Forms, out: &mut [bool]) {
     out.fill(false);
     let mut waiting = Waiting { tree, rays, forms, next: 0 };
     let mut flights: [Flight; IN_FLIGHT] = std::array::from_fn(|_| Flight::idle());

@@ -7,6 +7,9 @@ use crate::{
     simd::{Lanes, Simd},
 };
 
+/// Directions of rays that go together may differ by this part of the longest component.
+const NARROW: f32 = 0.3;
+
 impl PacketRays {
     /// Takes up to as many rays as a vector has lanes, at least one: the bits of those that may go together, which are
     /// those that [`TravRay::new`](crate::accel::TravRay::new) takes, that [`slabs::fits`] proves and whose volumes f32 holds. Other lanes repeat one of these.
@@ -32,6 +35,18 @@ impl PacketRays {
             self.derive::<S>(taken);
         }
         taken
+    }
+
+    /// True when the rays in `taken` do not all point nearly where the first does.
+    #[inline(always)]
+    pub(in crate::accel) fn points_apart<S: Simd>(&self, taken: u32) -> bool {
+        let first = (taken.trailing_zeros() & 15) as usize;
+        let room = S::F::splat(NARROW * self.longest);
+        let mut near = taken;
+        for row in &self.dir32 {
+            near &= (S::F::load(row) - S::F::splat(row[first])).abs().le(room);
+        }
+        near != taken
     }
 
     /// Takes the rows of origins, `t_near`, directions and `t_far`.

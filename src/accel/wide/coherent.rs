@@ -16,25 +16,36 @@ use crate::{
 /// Up to this many rays are walked one by one.
 const FEW: u32 = 2;
 
-/// As [`Accel::closest_all`](crate::accel::Accel::closest_all), each `packet` rays together.
+/// As [`Accel::closest_all`](crate::accel::Accel::closest_all), each `width` rays together; `apart` answers runs of those that point apart.
 #[inline(always)]
 pub(in crate::accel) fn closest<S: Simd, T: PacketTree>(
     tree: &T,
     prims: &Triangles<'_>,
     rays: &[Ray],
-    packet: usize,
+    width: usize,
     forms: Forms,
     out: &mut [Option<Hit>],
+    apart: impl Fn(&[Ray], &mut [Option<Hit>]),
 ) {
     let (mut lines, mut tri) = (PacketRays::EMPTY, Spread::EMPTY);
     let (mut at, mut end) = (0, 0);
+    // Rays from here to the packet point apart.
+    let mut waiting = 0;
     while at < rays.len() {
         // The rest of a packet that is longer than a vector follows by itself.
-        end = if at == end { rays.len().min(at + packet) } else { end };
+        end = if at == end { rays.len().min(at + width) } else { end };
         let next = end.min(at + S::F::LEN);
-        let (rays, out) = (&rays[at..next], &mut out[at..next]);
+        let (first, packet) = (at, &rays[at..next]);
         at = next;
-        let mut left = lines.load::<S>(rays, tree.reach(), forms);
+        let mut left = lines.load::<S>(packet, tree.reach(), forms);
+        if left == 0 || lines.points_apart::<S>(left) {
+            continue;
+        }
+        if waiting < first {
+            apart(&rays[waiting..first], &mut out[waiting..first]);
+        }
+        waiting = next;
+        let out = &mut out[first..next];
         let mut single = !left;
         let mut nearest = Nearest::NONE;
         while left != 0 {
@@ -50,31 +61,45 @@ pub(in crate::accel) fn closest<S: Simd, T: PacketTree>(
             }
         }
         nearest.answer::<S>(&lines, tree.blocks(), out);
-        for i in bits(single & (u32::MAX >> (32 - rays.len()))) {
-            out[i] = run::closest_one::<S, T>(tree, prims, &rays[i], forms);
+        for i in bits(single & (u32::MAX >> (32 - packet.len()))) {
+            out[i] = run::closest_one::<S, T>(tree, prims, &packet[i], forms);
         }
+    }
+    if waiting < rays.len() {
+        apart(&rays[waiting..], &mut out[waiting..]);
     }
 }
 
-/// As [`Accel::occluded_all`](crate::accel::Accel::occluded_all), each `packet` rays together.
+/// As [`Accel::occluded_all`](crate::accel::Accel::occluded_all), each `width` rays together; `apart` answers runs of those that point apart.
 #[inline(always)]
 pub(in crate::accel) fn occluded<S: Simd, T: PacketTree>(
     tree: &T,
     prims: &Triangles<'_>,
     rays: &[Ray],
-    packet: usize,
+    width: usize,
     forms: Forms,
     out: &mut [bool],
+    apart: impl Fn(&[Ray], &mut [bool]),
 ) {
     let (mut lines, mut tri) = (PacketRays::EMPTY, Spread::EMPTY);
     let (mut at, mut end) = (0, 0);
+    // Rays from here to the packet point apart.
+    let mut waiting = 0;
     while at < rays.len() {
         // The rest of a packet that is longer than a vector follows by itself.
-        end = if at == end { rays.len().min(at + packet) } else { end };
+        end = if at == end { rays.len().min(at + width) } else { end };
         let next = end.min(at + S::F::LEN);
-        let (rays, out) = (&rays[at..next], &mut out[at..next]);
+        let (first, packet) = (at, &rays[at..next]);
         at = next;
-        let mut left = lines.load::<S>(rays, tree.reach(), forms);
+        let mut left = lines.load::<S>(packet, tree.reach(), forms);
+        if left == 0 || lines.points_apart::<S>(left) {
+            continue;
+        }
+        if waiting < first {
+            apart(&rays[waiting..first], &mut out[waiting..first]);
+        }
+        waiting = next;
+        let out = &mut out[first..next];
         let mut single = !left;
         let mut blocked = 0;
         while left != 0 {
@@ -92,9 +117,12 @@ pub(in crate::accel) fn occluded<S: Simd, T: PacketTree>(
         for (i, out) in out.iter_mut().enumerate() {
             *out = blocked >> i & 1 == 1;
         }
-        for i in bits(single & (u32::MAX >> (32 - rays.len()))) {
-            out[i] = run::occluded_one::<S, T>(tree, prims, &rays[i], forms);
+        for i in bits(single & (u32::MAX >> (32 - packet.len()))) {
+            out[i] = run::occluded_one::<S, T>(tree, prims, &packet[i], forms);
         }
+    }
+    if waiting < rays.len() {
+        apart(&rays[waiting..], &mut out[waiting..]);
     }
 }
 

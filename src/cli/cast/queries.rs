@@ -60,32 +60,47 @@ impl Queries<'_> {
         for _ in 0..repeat {
             let start = Instant::now();
             let chunks = rays.par_chunks(CHUNK * RAY_BYTES).zip(records.par_chunks_mut(CHUNK * HIT_BYTES));
-            chunks.try_for_each(|(rays, out)| self.cast(rays.as_chunks().0, out.as_chunks_mut().0))?;
+            // Answers of a run, used again for the next.
+            chunks.try_for_each_init(Answers::default, |answers, (rays, out)| {
+                self.cast(rays.as_chunks().0, answers, out.as_chunks_mut().0)
+            })?;
             seconds.push(start.elapsed().as_secs_f64());
         }
         Ok((records, seconds))
     }
 
     /// Casts a run of rays on one thread.
-    fn cast(&self, records: &[[u8; RAY_BYTES]], out: &mut [[u8; HIT_BYTES]]) -> Result<(), FloatModeError> {
+    fn cast(
+        &self,
+        records: &[[u8; RAY_BYTES]],
+        answers: &mut Answers,
+        out: &mut [[u8; HIT_BYTES]],
+    ) -> Result<(), FloatModeError> {
         let rays = decode(records);
         let (prims, simd, forms) = (&self.prims, self.simd, self.precision.into());
         let packet = if self.packet { PACKET } else { 1 };
         if self.any_hit {
-            let mut blocked = vec![false; rays.len()];
-            self.accel.blocked_as(prims, &rays, packet, simd, forms, &mut blocked)?;
-            for (out, &blocked) in out.iter_mut().zip(&blocked) {
+            answers.blocked.resize(rays.len(), false);
+            self.accel.blocked_as(prims, &rays, packet, simd, forms, &mut answers.blocked)?;
+            for (out, &blocked) in out.iter_mut().zip(&answers.blocked) {
                 *out = encode_blocked(blocked);
             }
         } else {
-            let mut hits = vec![None; rays.len()];
-            self.accel.closest_hits_as(prims, &rays, packet, simd, forms, &mut hits)?;
-            for (out, hit) in out.iter_mut().zip(&hits) {
+            answers.hits.resize(rays.len(), None);
+            self.accel.closest_hits_as(prims, &rays, packet, simd, forms, &mut answers.hits)?;
+            for (out, hit) in out.iter_mut().zip(&answers.hits) {
                 *out = encode_hit(*hit);
             }
         }
         Ok(())
     }
+}
+
+/// Answers before they become records.
+#[derive(Default)]
+struct Answers {
+    hits: Vec<Option<Hit>>,
+    blocked: Vec<bool>,
 }
 
 /// The rays of records, which are what they look like in memory where numbers are little-endian and lie at their places.
