@@ -91,7 +91,7 @@ impl TriBlock {
 
     /// The corners in f64.
     #[inline(always)]
-    fn widened<S: Simd>(&self) -> [D3<S>; 3] {
+    pub(super) fn widened<S: Simd>(&self) -> [D3<S>; 3] {
         let [a, b, c] = &self.corners;
         [widened3::<S>(a), widened3::<S>(b), widened3::<S>(c)]
     }
@@ -475,7 +475,7 @@ fn transposed([a, b, c, d]: [Vec4; 4]) -> [Vec4; 3] {
     [rows.x_axis, rows.y_axis, rows.z_axis]
 }
 
-type D3<S> = [<S as Simd>::D4; 3];
+pub(super) type D3<S> = [<S as Simd>::D4; 3];
 
 // No closures and no `map` here: they do not inherit the features of the function they stand in, and intrinsics become
 // calls.

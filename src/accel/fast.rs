@@ -42,6 +42,18 @@ impl<L: Lanes<Elem = f32>> Divided<L> {
     }
 }
 
+impl<L: Lanes<Elem = f32>> Divided<L> {
+    /// t, u and v of one of up to four lanes.
+    #[inline(always)]
+    pub(super) fn tuv(&self, lane: usize) -> [f32; 3] {
+        let (mut t, mut u, mut v) = ([0.0; 4], [0.0; 4], [0.0; 4]);
+        self.t.store(&mut t);
+        self.u.store(&mut u);
+        self.v.store(&mut v);
+        [t[lane & 3], u[lane & 3], v[lane & 3]]
+    }
+}
+
 /// t, u and v of four lanes in memory.
 struct Stored([[f32; 4]; 3]);
 
@@ -64,7 +76,7 @@ impl Stored {
 
 impl TriBlock {
     #[inline(always)]
-    fn test_fast<S: Simd>(&self, range: &RayRange, t_limit: f32) -> Divided<S::F4> {
+    pub(super) fn test_fast<S: Simd>(&self, range: &RayRange, t_limit: f32) -> Divided<S::F4> {
         let (origin, dir) = (splat3(&range.origin.to_array()), splat3(&range.dir.to_array()));
         let volumes = Volumes::<S::F4>::new(self.narrow::<S>(), origin, dir);
         let open = volumes.open(S::F4::splat(0.0));

@@ -191,6 +191,38 @@ impl Line {
     }
 }
 
+/// As many rays as a vector has lanes: on each axis [`Slab`]'s four numbers, with the slack of comparisons as in [`Line`].
+#[derive(Clone, Copy)]
+pub(super) struct Lines {
+    /// `[axis][entry factor, entry summand, exit factor, exit summand][ray]`.
+    pub(super) rows: [[[f32; 16]; 4]; 3],
+}
+
+impl Lines {
+    pub(super) const EMPTY: Self = Self { rows: [[[0.0; 16]; 4]; 3] };
+
+    #[inline(always)]
+    pub(super) fn fill<S: Simd>(
+        &mut self,
+        [ox, oy, oz]: &[[f32; 16]; 3],
+        [dx, dy, dz]: &[[f32; 16]; 3],
+        reach: f32,
+        nodes: Precision,
+    ) {
+        let origin = [S::F::load(ox), S::F::load(oy), S::F::load(oz)];
+        let dir = [S::F::load(dx), S::F::load(dy), S::F::load(dz)];
+        let extent = Extent::new(origin, dir, reach);
+        for axis in 0..3 {
+            let slab = Slab::new(origin[axis], dir[axis], &extent, nodes);
+            let [entry_mul, entry_add, exit_mul, exit_add] = &mut self.rows[axis];
+            slab.entry_mul.store(entry_mul);
+            slab.entry_add.store(entry_add);
+            slab.exit_mul.store(exit_mul);
+            (slab.exit_add + S::F::splat(SLACK)).store(exit_add);
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use glam::Vec3;

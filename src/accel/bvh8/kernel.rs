@@ -9,7 +9,8 @@ use crate::{
         Closest, Counter, HitSink, TravRay,
         block::{BlockRay, TriBlock},
         query::SLACK,
-        slabs::{self, Line},
+        packet::PacketRays,
+        slabs::{self, Line, Lines},
         topology::MAX_DEPTH,
         wide::{
             Place, Tree, WIDTH,
@@ -33,6 +34,29 @@ pub(super) struct Boxes {
 }
 
 impl Boxes {
+    /// No ray.
+    pub(super) const IDLE: Self = Self {
+        line: Line { entry_mul: [0.0; 4], entry_add: [0.0; 4], exit_mul: [0.0; 4], exit_add: [0.0; 4] },
+        backward: [0; 3],
+        t_near: 0.0,
+        limit: 0.0,
+    };
+
+    /// Takes ray i of many.
+    #[inline(always)]
+    pub(super) fn take(&mut self, lines: &Lines, rays: &PacketRays, i: usize) {
+        for axis in 0..3 {
+            let rows = &lines.rows[axis];
+            self.line.entry_mul[axis] = rows[0][i];
+            self.line.entry_add[axis] = rows[1][i];
+            self.line.exit_mul[axis] = rows[2][i];
+            self.line.exit_add[axis] = rows[3][i];
+            self.backward[axis] = (rays.backward[axis] >> i & 1) as u8;
+        }
+        self.t_near = rays.t_near32[i];
+        self.set_limit(rays.t_cull[i]);
+    }
+
     #[inline(always)]
     pub(super) fn new<S: Simd>(ray: &TravRay, reach: f32, limit: f32) -> Self {
         let dir = ray.range().dir;

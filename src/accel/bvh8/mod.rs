@@ -22,7 +22,7 @@ use super::{
     block::TriBlock,
     check_indices,
     lineage::{self, Lineage, Refittable},
-    run, sah,
+    sah,
     topology::{self, Child, Cut, wide::collapse},
     wide::{
         Place, Tree, WIDTH, coherent, packet as wide_packet,
@@ -255,12 +255,10 @@ impl Accel for Bvh8 {
         out: &mut [Option<Hit>],
     ) {
         if packet == 1 {
-            S::call(ClosestApart { tree: self, rays, forms, out });
-        } else if forms == Forms::EXACT {
-            let apart = |rays: &[Ray], out: &mut [Option<Hit>]| S::call(ClosestApart { tree: self, rays, forms, out });
-            coherent::closest::<S, Self>(self, prims, rays, packet, forms, out, apart);
+            S::call(ClosestApart { tree: self, prims, rays, forms, out });
         } else {
-            run::closest_all::<S, Self>(self, prims, rays, packet, forms, out);
+            let apart = |rays: &[Ray], out: &mut [Option<Hit>]| S::call(ClosestApart { tree: self, prims, rays, forms, out });
+            coherent::closest::<S, Self>(self, prims, rays, packet, forms, out, apart);
         }
     }
 
@@ -274,12 +272,10 @@ impl Accel for Bvh8 {
         out: &mut [bool],
     ) {
         if packet == 1 {
-            S::call(OccludedApart { tree: self, rays, forms, out });
-        } else if forms == Forms::EXACT {
-            let apart = |rays: &[Ray], out: &mut [bool]| S::call(OccludedApart { tree: self, rays, forms, out });
-            coherent::occluded::<S, Self>(self, prims, rays, packet, forms, out, apart);
+            S::call(OccludedApart { tree: self, prims, rays, forms, out });
         } else {
-            run::occluded_all::<S, Self>(self, prims, rays, packet, forms, out);
+            let apart = |rays: &[Ray], out: &mut [bool]| S::call(OccludedApart { tree: self, prims, rays, forms, out });
+            coherent::occluded::<S, Self>(self, prims, rays, packet, forms, out, apart);
         }
     }
 

@@ -1,35 +1,31 @@
-//! Many single rays, a few of them in flight.
+//! Rays that do not go together: many of them, a few in flight.
 //!
 //! The step of one ray through a node is a chain of operations that each wait for the one before, so a walk by itself leaves most of a core idle. Here the rays in
 //! flight take turns, a step each. A step has few branches: the children that are met go on the stack in order, by a sorting network and not by comparisons, and
-//! the next step takes the last.
+//! the next step takes the last. Rays are prepared and their hits are rounded a vector at a time.
 
 use super::{
     Bvh8,
-    kernel::{Boxes, ClosestLeaf, MAX_STACK, OccludedLeaf},
+    kernel::{Boxes, MAX_STACK},
     node::Link,
 };
 use crate::{
     accel::{
-        AnyHit, Closest, TravRay, slabs,
+        PACKET,
+        packet::{Nearest, PacketRays, bits},
+        run,
+        slabs::Lines,
         wide::{Place, WIDTH},
     },
-    geom::{Forms, Hit, Ray},
-    simd::{LEAST_KEY, Scalar, Simd, Task, key_floor},
+    geom::{Forms, Hit, Ray, Triangles},
+    simd::{LEAST_KEY, Lanes, Simd, Task, key_floor},
 };
-
-impl Bvh8 {
-    #[cold]
-    #[inline(never)]
-    fn one_wide(&self, ray: &TravRay) -> Option<Hit> {
-        let mut best = Closest::new(ray);
-        self.closest_wide(ray, &mut best, &AnyHit, &mut ());
-        best.hit(ray)
-    }
-}
 
 /// Rays in flight.
 const IN_FLIGHT: usize = 4;
+
+/// Vectors of rays that are prepared at once.
+const WINGS: usize = 4;
 
 /// Places for all children of a node.
 #[inline(always)]
@@ -37,13 +33,36 @@ fn room(words: &mut [u32; MAX_STACK], at: usize) -> &mut [u32; WIDTH] {
     words[at..].first_chunk_mut().expect("every level leaves room for its children")
 }
 
+/// A vector of rays.
+struct Wing {
+    rays: PacketRays,
+    lines: Lines,
+    nearest: Nearest,
+    /// Those that are answered here.
+    taken: u32,
+    blocked: u32,
+}
+
+impl Wing {
+    const EMPTY: Self =
+        Self { rays: PacketRays::EMPTY, lines: Lines::EMPTY, nearest: Nearest::NONE, taken: 0, blocked: 0 };
+
+    #[inline(always)]
+    fn load<S: Simd>(&mut self, tree: &Bvh8, rays: &[Ray], forms: Forms) {
+        self.taken = self.rays.load::<S>(rays, tree.reach, forms);
+        self.rays.bound::<S>();
+        self.lines.fill::<S>(&self.rays.origin32, &self.rays.dir32, tree.reach, forms.nodes);
+        self.nearest = Nearest::NONE;
+        self.blocked = 0;
+    }
+}
+
 /// A ray on its way.
 struct Flight {
     boxes: Boxes,
-    ray: TravRay,
-    best: Closest,
-    /// Number of the ray.
-    number: usize,
+    /// Where the ray is.
+    wing: usize,
+    lane: usize,
     /// Children to visit, the last first; the items before `len`.
     len: usize,
     keys: [u32; MAX_STACK],
@@ -51,40 +70,30 @@ struct Flight {
 }
 
 impl Flight {
-    fn idle() -> Self {
-        let ray = TravRay::STAND_IN;
-        Self {
-            boxes: Boxes::new::<Scalar>(&ray, 1.0, 0.0),
-            best: Closest::new(&ray),
-            ray,
-            number: 0,
-            len: 0,
-            keys: [0; MAX_STACK],
-            links: [0; MAX_STACK],
-        }
-    }
+    const IDLE: Self =
+        Self { boxes: Boxes::IDLE, wing: 0, lane: 0, len: 0, keys: [0; MAX_STACK], links: [0; MAX_STACK] };
 
     /// Puts a ray on its way.
     #[inline(always)]
-    fn begin<S: Simd>(&mut self, tree: &Bvh8, ray: TravRay, number: usize) {
-        self.boxes = Boxes::new::<S>(&ray, tree.reach, ray.range().t_far);
-        self.best = Closest::new(&ray);
-        self.ray = ray;
-        self.number = number;
+    fn begin(&mut self, wings: &[Wing; WINGS], wing: usize, lane: usize) {
+        let from = &wings[wing % WINGS];
+        self.boxes.take(&from.lines, &from.rays, lane % PACKET);
+        (self.wing, self.lane) = (wing, lane);
         self.len = 1;
         (self.keys[0], self.links[0]) = (LEAST_KEY, Bvh8::root().bits());
     }
 
     #[inline(always)]
-    fn closest_step<S: Simd>(&mut self, tree: &Bvh8) {
+    fn closest_step<S: Simd>(&mut self, tree: &Bvh8, wings: &mut [Wing; WINGS]) {
         self.len -= 1;
         let (key, link) = (self.keys[self.len], Link::from_bits(self.links[self.len]));
         if !self.boxes.reaches(key_floor(key)) {
             return;
         }
         if link.is_leaf() {
-            S::call(ClosestLeaf { tree, link, ray: &self.ray, best: &mut self.best, sink: &AnyHit, count: &mut () });
-            self.boxes.set_limit(self.best.t_cull());
+            let wing = &mut wings[self.wing % WINGS];
+            S::call(ClosestLeaf { tree, link, wing, lane: self.lane % PACKET });
+            self.boxes.set_limit(wing.rays.t_cull[self.lane % PACKET]);
             return;
         }
         let node = &tree.nodes[link.index()];
@@ -96,11 +105,12 @@ impl Flight {
 
     /// True when the ray is blocked.
     #[inline(always)]
-    fn occluded_step<S: Simd>(&mut self, tree: &Bvh8) -> bool {
+    fn occluded_step<S: Simd>(&mut self, tree: &Bvh8, wings: &[Wing; WINGS]) -> bool {
         self.len -= 1;
         let link = Link::from_bits(self.links[self.len]);
         if link.is_leaf() {
-            return S::call(OccludedLeaf { tree, link, ray: &self.ray, sink: &AnyHit, count: &mut () });
+            let rays = &wings[self.wing % WINGS].rays;
+            return S::call(OccludedLeaf { tree, link, rays, lane: self.lane % PACKET });
         }
         let node = &tree.nodes[link.index()];
         let (_, hits) = self.boxes.test::<S>(node);
@@ -110,36 +120,116 @@ impl Flight {
     }
 }
 
-/// The rays of a batch that are still to begin.
-struct Waiting<'a> {
+struct ClosestLeaf<'a> {
     tree: &'a Bvh8,
-    rays: &'a [Ray],
-    forms: Forms,
-    next: usize,
+    link: Link,
+    wing: &'a mut Wing,
+    lane: usize,
 }
 
-impl Waiting<'_> {
-    /// Puts the next ray on its way that can hit something and whose f32 tests are proven; `wide` answers the others. False when none is left.
+impl Task for ClosestLeaf<'_> {
+    type Output = ();
+
     #[inline(always)]
-    fn launch<S: Simd>(&mut self, flight: &mut Flight, mut wide: impl FnMut(&TravRay, usize)) -> bool {
-        while let Some(ray) = self.rays.get(self.next) {
-            let number = self.next;
-            self.next += 1;
-            if let Some(ray) = TravRay::with_forms(ray, self.forms) {
-                if slabs::fits(&ray, self.tree.reach) {
-                    flight.begin::<S>(self.tree, ray, number);
-                    return true;
-                }
-                wide(&ray, number);
+    fn run<S: Simd>(self) {
+        let Self { tree, link, wing, lane } = self;
+        for number in link.blocks() {
+            wing.nearest.offer_one::<S>(&mut wing.rays, &tree.blocks, number, lane);
+        }
+    }
+}
+
+struct OccludedLeaf<'a> {
+    tree: &'a Bvh8,
+    link: Link,
+    rays: &'a PacketRays,
+    lane: usize,
+}
+
+impl Task for OccludedLeaf<'_> {
+    type Output = bool;
+
+    #[inline(always)]
+    fn run<S: Simd>(self) -> bool {
+        let Self { tree, link, rays, lane } = self;
+        for number in link.blocks() {
+            if tree.blocks[number].blocks_one::<S>(rays, lane) {
+                return true;
             }
         }
         false
     }
 }
 
+/// The rays that are still to begin, wing by wing.
+struct Waiting {
+    wing: usize,
+    left: u32,
+}
+
+impl Waiting {
+    /// The next ray.
+    #[inline(always)]
+    fn next(&mut self, wings: &[Wing; WINGS], used: usize) -> Option<(usize, usize)> {
+        while self.left == 0 {
+            self.wing += 1;
+            if self.wing >= used {
+                return None;
+            }
+            self.left = wings[self.wing % WINGS].taken;
+        }
+        let lane = self.left.trailing_zeros() as usize;
+        self.left &= self.left - 1;
+        Some((self.wing, lane))
+    }
+}
+
+/// Flies all rays of the wings in use: to their closest hits, or to any.
+#[inline(always)]
+fn fly<S: Simd, const ANY: bool>(
+    tree: &Bvh8,
+    wings: &mut [Wing; WINGS],
+    used: usize,
+    flights: &mut [Flight; IN_FLIGHT],
+) {
+    let mut waiting = Waiting { wing: 0, left: wings[0].taken };
+    let mut slots = [0; IN_FLIGHT];
+    let mut live = 0;
+    while live < IN_FLIGHT
+        && let Some((wing, lane)) = waiting.next(wings, used)
+    {
+        flights[live].begin(wings, wing, lane);
+        slots[live] = live;
+        live += 1;
+    }
+    while live > 0 {
+        let mut at = 0;
+        while at < live {
+            let flight = &mut flights[slots[at] % IN_FLIGHT];
+            let mut is_done = false;
+            if ANY {
+                is_done = flight.occluded_step::<S>(tree, wings);
+                wings[flight.wing % WINGS].blocked |= u32::from(is_done) << flight.lane;
+            } else {
+                flight.closest_step::<S>(tree, wings);
+            }
+            if is_done || flight.len == 0 {
+                let Some((wing, lane)) = waiting.next(wings, used) else {
+                    live -= 1;
+                    slots.swap(at, live);
+                    continue;
+                };
+                flight.begin(wings, wing, lane);
+            }
+            at += 1;
+        }
+    }
+}
+
 /// The closest hit of every ray.
 pub(super) struct ClosestApart<'a> {
     pub(super) tree: &'a Bvh8,
+    pub(super) prims: &'a Triangles<'a>,
     pub(super) rays: &'a [Ray],
     pub(super) forms: Forms,
     pub(super) out: &'a mut [Option<Hit>],
@@ -150,35 +240,29 @@ impl Task for ClosestApart<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self) {
-        let Self { tree, rays, forms, out } = self;
-        closest::<S>(tree, rays, forms, out);
-    }
-}
-
-#[inline(always)]
-fn closest<S: Simd>(tree: &Bvh8, rays: &[Ray], forms: Forms, out: &mut [Option<Hit>]) {
-    out.fill(None);
-    let mut waiting = Waiting { tree, rays, forms, next: 0 };
-    let mut flights: [Flight; IN_FLIGHT] = std::array::from_fn(|_| Flight::idle());
-    let mut slots: [usize; IN_FLIGHT] = std::array::from_fn(|slot| slot);
-    let mut live = 0;
-    while live < IN_FLIGHT && waiting.launch::<S>(&mut flights[live], |ray, number| out[number] = tree.one_wide(ray)) {
-        live += 1;
-    }
-    while live > 0 {
+        let Self { tree, prims, rays, forms, out } = self;
+        let mut wings = [const { Wing::EMPTY }; WINGS];
+        let mut flights = [const { Flight::IDLE }; IN_FLIGHT];
         let mut at = 0;
-        while at < live {
-            let flight = &mut flights[slots[at] % IN_FLIGHT];
-            flight.closest_step::<S>(tree);
-            if flight.len == 0 {
-                out[flight.number] = flight.best.hit(&flight.ray);
-                if !waiting.launch::<S>(flight, |ray, number| out[number] = tree.one_wide(ray)) {
-                    live -= 1;
-                    slots.swap(at, live);
-                    continue;
+        while at < rays.len() {
+            let (start, mut used) = (at, 0);
+            while used < WINGS && at < rays.len() {
+                let next = rays.len().min(at + S::F::LEN);
+                wings[used].load::<S>(tree, &rays[at..next], forms);
+                at = next;
+                used += 1;
+            }
+            fly::<S, false>(tree, &mut wings, used, &mut flights);
+            at = start;
+            for wing in &wings[..used] {
+                let next = rays.len().min(at + S::F::LEN);
+                let (rays, out) = (&rays[at..next], &mut out[at..next]);
+                at = next;
+                wing.nearest.answer::<S>(&wing.rays, &tree.blocks, out);
+                for i in bits(!wing.taken & (u32::MAX >> (32 - rays.len()))) {
+                    out[i] = run::closest_one::<S, Bvh8>(tree, prims, &rays[i], forms);
                 }
             }
-            at += 1;
         }
     }
 }
@@ -186,6 +270,7 @@ fn closest<S: Simd>(tree: &Bvh8, rays: &[Ray], forms: Forms, out: &mut [Option<H
 /// Whether every ray is blocked.
 pub(super) struct OccludedApart<'a> {
     pub(super) tree: &'a Bvh8,
+    pub(super) prims: &'a Triangles<'a>,
     pub(super) rays: &'a [Ray],
     pub(super) forms: Forms,
     pub(super) out: &'a mut [bool],
@@ -196,36 +281,31 @@ impl Task for OccludedApart<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self) {
-        let Self { tree, rays, forms, out } = self;
-        occluded::<S>(tree, rays, forms, out);
-    }
-}
-
-#[inline(always)]
-fn occluded<S: Simd>(tree: &Bvh8, rays: &[Ray], forms: Forms, out: &mut [bool]) {
-    out.fill(false);
-    let mut waiting = Waiting { tree, rays, forms, next: 0 };
-    let mut flights: [Flight; IN_FLIGHT] = std::array::from_fn(|_| Flight::idle());
-    let mut slots: [usize; IN_FLIGHT] = std::array::from_fn(|slot| slot);
-    let mut live = 0;
-    let wide = |ray: &TravRay| tree.occluded_wide(ray, &AnyHit, &mut ());
-    while live < IN_FLIGHT && waiting.launch::<S>(&mut flights[live], |ray, number| out[number] = wide(ray)) {
-        live += 1;
-    }
-    while live > 0 {
+        let Self { tree, prims, rays, forms, out } = self;
+        let mut wings = [const { Wing::EMPTY }; WINGS];
+        let mut flights = [const { Flight::IDLE }; IN_FLIGHT];
         let mut at = 0;
-        while at < live {
-            let flight = &mut flights[slots[at] % IN_FLIGHT];
-            let blocked = flight.occluded_step::<S>(tree);
-            if blocked || flight.len == 0 {
-                out[flight.number] = blocked;
-                if !waiting.launch::<S>(flight, |ray, number| out[number] = wide(ray)) {
-                    live -= 1;
-                    slots.swap(at, live);
-                    continue;
+        while at < rays.len() {
+            let (start, mut used) = (at, 0);
+            while used < WINGS && at < rays.len() {
+                let next = rays.len().min(at + S::F::LEN);
+                wings[used].load::<S>(tree, &rays[at..next], forms);
+                at = next;
+                used += 1;
+            }
+            fly::<S, true>(tree, &mut wings, used, &mut flights);
+            at = start;
+            for wing in &wings[..used] {
+                let next = rays.len().min(at + S::F::LEN);
+                let (rays, out) = (&rays[at..next], &mut out[at..next]);
+                at = next;
+                for (i, out) in out.iter_mut().enumerate() {
+                    *out = wing.blocked >> i & 1 == 1;
+                }
+                for i in bits(!wing.taken & (u32::MAX >> (32 - rays.len()))) {
+                    out[i] = run::occluded_one::<S, Bvh8>(tree, prims, &rays[i], forms);
                 }
             }
-            at += 1;
         }
     }
 }

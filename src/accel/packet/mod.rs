@@ -24,6 +24,7 @@ const FEW: u32 = 2;
 type Row = [f32; PACKET];
 
 /// The rays of a packet by component. Triangle tests in f64 widen what they load.
+#[derive(Clone, Copy)]
 pub(in crate::accel) struct PacketRays {
     pub(in crate::accel) origin32: [[f32; PACKET]; 3],
     pub(in crate::accel) dir32: [[f32; PACKET]; 3],
@@ -33,6 +34,8 @@ pub(in crate::accel) struct PacketRays {
     t_far: Row,
     /// `|dir|∞`.
     scale: Row,
+    /// Bound on the errors of U, V and W of every triangle within the reach, as [`BlockRay::new`](super::block::BlockRay::new) derives it.
+    uv_error: [f64; PACKET],
     /// Bits of the rays that run downward, by axis.
     pub(in crate::accel) backward: [u32; 3],
     common_origin: bool,
@@ -66,6 +69,7 @@ impl PacketRays {
         t_cull: [0.0; PACKET],
         t_far: [0.0; PACKET],
         scale: [0.0; PACKET],
+        uv_error: [0.0; PACKET],
         backward: [0; 3],
         common_origin: false,
         longest: 0.0,

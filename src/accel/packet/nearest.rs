@@ -7,6 +7,7 @@ use super::{BOUND32, PACKET, PacketRays, bits, leaf::{Spread, narrow3, wide3, wi
 use crate::{
     accel::{
         block::{Evaluated, NO_PRIM, TriBlock, Volumes, Weights},
+        fast::Divided,
         query::{SLACK, round_up},
     },
     geom::{
@@ -21,11 +22,14 @@ use crate::{
 const NOWHERE: u32 = u32::MAX;
 
 /// The best of each ray of a packet.
+#[derive(Clone, Copy)]
 pub(in crate::accel) struct Nearest {
     /// At most the exact t of the best, or infinity. [`PacketRays::t_cull`] is at least that t.
     low: [f32; PACKET],
     /// Four times the number of the best's block, and its lane.
     place: [u32; PACKET],
+    /// u and v where leaves are tested fast; t is [`PacketRays::t_cull`].
+    fast: [[f32; PACKET]; 2],
 }
 
 /// The least f32 above `4 * 2^-23`, what the roundings of t amount to.
@@ -33,7 +37,7 @@ const ROUNDING: f32 = 4.0 * f32::EPSILON;
 
 impl Nearest {
     /// Nothing hit yet.
-    pub(in crate::accel) const NONE: Self = Self { low: [f32::INFINITY; PACKET], place: [NOWHERE; PACKET] };
+    pub(in crate::accel) const NONE: Self = Self { low: [f32::INFINITY; PACKET], place: [NOWHERE; PACKET], fast: [[0.0; PACKET]; 2] };
 
     /// Offers the triangles of block `number` to the active rays.
     #[inline(always)]
@@ -57,8 +61,17 @@ impl Nearest {
             if open == 0 {
                 continue;
             }
-            let bounded = tri.bounded::<S::F>(lane, volumes);
+            #[expect(clippy::cast_possible_truncation, reason = "there are fewer than 2^28 blocks")]
+            let place = (4 * number + lane) as u32;
             let (near, limit) = (S::F::load(&packet.t_near32), S::F::load(&packet.t_cull));
+            if packet.fast {
+                let divided = Divided::new(volumes, open, near, limit);
+                let nearer = divided.mask & divided.t.lt(limit);
+                self.keep_fast::<S>(packet, &divided, nearer, place);
+                self.keep_equals::<S>(packet, blocks, &divided, divided.mask & !nearer, place);
+                continue;
+            }
+            let bounded = tri.bounded::<S::F>(lane, volumes);
             let beyond = bounded.solid & (limit.lt(bounded.t_low) | bounded.t_high.lt(near));
             let open = open & !beyond;
             if open == 0 {
@@ -67,8 +80,6 @@ impl Nearest {
             let low = S::F::load(&self.low);
             let before = bounded.t_high.lt(low) & bounded.t_high.le(S::F::load(&packet.t_far));
             let sure = open & bounded.sure & near.le(bounded.t_low) & before;
-            #[expect(clippy::cast_possible_truncation, reason = "there are fewer than 2^28 blocks")]
-            let place = (4 * number + lane) as u32;
             if sure != 0 {
                 S::F::select(sure, bounded.t_low, low).store(&mut self.low);
                 S::F::select(sure, bounded.t_high, limit).store(&mut packet.t_cull);
@@ -78,6 +89,97 @@ impl Nearest {
             if doubtful != 0 {
                 S::call(Settle { nearest: self, packet, blocks, place, doubtful });
             }
+        }
+    }
+
+    #[inline(always)]
+    fn keep_fast<S: Simd>(&mut self, packet: &mut PacketRays, hit: &Divided<S::F>, kept: u32, place: u32) {
+        let [u, v] = &mut self.fast;
+        for (row, lanes) in [(&mut packet.t_cull, hit.t), (u, hit.u), (v, hit.v)] {
+            S::F::select(kept, lanes, S::F::load(row)).store(row);
+        }
+        S::write_where(kept, place, &mut self.place);
+    }
+
+    /// Keeps those of equal t that have no best yet or one of a higher number.
+    #[inline(always)]
+    fn keep_equals<S: Simd>(
+        &mut self,
+        packet: &mut PacketRays,
+        blocks: &[TriBlock],
+        hit: &Divided<S::F>,
+        equal: u32,
+        place: u32,
+    ) {
+        if equal != 0 {
+            let mut kept = 0;
+            for i in bits(equal) {
+                kept |= u32::from(self.gives_way(blocks, i % PACKET, place)) << i;
+            }
+            self.keep_fast::<S>(packet, hit, kept, place);
+        }
+    }
+
+    /// True when ray i has no best or one whose number is above that of another triangle.
+    fn gives_way(&self, blocks: &[TriBlock], i: usize, place: u32) -> bool {
+        self.place[i] == NOWHERE || triangle(blocks, place).1 < triangle(blocks, self.place[i]).1
+    }
+
+    /// Offers the triangles of block `number` to ray i by itself.
+    #[inline(always)]
+    pub(in crate::accel) fn offer_one<S: Simd>(
+        &mut self,
+        packet: &mut PacketRays,
+        blocks: &[TriBlock],
+        number: usize,
+        i: usize,
+    ) {
+        let block = &blocks[number];
+        if packet.fast {
+            let divided = block.test_fast::<S>(&packet.range(i), packet.t_cull[i]);
+            for lane in bits(divided.mask) {
+                let [t, u, v] = divided.tuv(lane);
+                #[expect(clippy::cast_possible_truncation, reason = "there are fewer than 2^28 blocks")]
+                let place = (4 * number + lane) as u32;
+                let limit = packet.t_cull[i];
+                if block.prim(lane % 4) != NO_PRIM && (t < limit || t <= limit && self.gives_way(blocks, i, place)) {
+                    (packet.t_cull[i], self.fast[0][i], self.fast[1][i]) = (t, u, v);
+                    self.place[i] = place;
+                }
+            }
+            return;
+        }
+        let Some(evaluated) = block.weigh::<S>(packet, i) else { return };
+        let (mut low, mut high) = ([0.0; 4], [0.0; 4]);
+        evaluated.rows[0].store(&mut low);
+        evaluated.rows[1].store(&mut high);
+        let mut mask = evaluated.mask;
+        while mask != 0 {
+            let lane = (mask.trailing_zeros() & 3) as usize;
+            mask &= mask - 1;
+            if block.prim(lane) != NO_PRIM {
+                #[expect(clippy::cast_possible_truncation, reason = "there are fewer than 2^28 blocks")]
+                let place = (4 * number + lane) as u32;
+                let sure = evaluated.sure >> lane & 1 == 1;
+                self.settle(packet, blocks, i, place, (sure, [low[lane], high[lane]]));
+            }
+        }
+    }
+
+    /// Keeps a triangle that f64 finds hit by ray i, surely or not, if it is the nearest.
+    #[inline(always)]
+    fn settle(
+        &mut self,
+        packet: &mut PacketRays,
+        blocks: &[TriBlock],
+        i: usize,
+        place: u32,
+        (sure, [low, high]): (bool, [f64; 2]),
+    ) {
+        if sure && high < f64::from(self.low[i]) {
+            self.keep(packet, i, place, [low, high]);
+        } else if !sure || low <= f64::from(packet.t_cull[i]) {
+            self.decide(packet, blocks, i, place);
         }
     }
 
@@ -116,6 +218,18 @@ impl Nearest {
         found
     }
 
+    #[inline(always)]
+    fn answer_fast(&self, packet: &PacketRays, blocks: &[TriBlock], found: u32, out: &mut [Option<Hit>]) {
+        for i in 0..out.len().min(PACKET) {
+            out[i] = None;
+            if found >> i & 1 == 1 {
+                let (t, u, v) = (packet.t_cull[i], self.fast[0][i], self.fast[1][i]);
+                let (_, prim) = triangle(blocks, self.place[i]);
+                out[i] = Some(Hit { t, u, v, prim, instance: InstanceId(0) });
+            }
+        }
+    }
+
     /// The hits of all rays, rounded, into `out`.
     #[inline(always)]
     pub(in crate::accel) fn answer<S: Simd>(
@@ -127,6 +241,10 @@ impl Nearest {
         let found = self.found() & (u32::MAX >> (32 - out.len()));
         if found == 0 {
             out.fill(None);
+            return;
+        }
+        if packet.fast {
+            self.answer_fast(packet, blocks, found, out);
             return;
         }
         let mut corners = [[[0.0; PACKET]; 3]; 3];
@@ -153,6 +271,12 @@ impl Nearest {
             out[i] = exactly(packet, blocks, i, self.place[i]);
         }
     }
+}
+
+/// A number of each axis of ray i in all lanes.
+#[inline(always)]
+fn splat3<S: Simd>([x, y, z]: &[[f32; PACKET]; 3], i: usize) -> [S::D4; 3] {
+    [S::D4::splat(f64::from(x[i])), S::D4::splat(f64::from(y[i])), S::D4::splat(f64::from(z[i]))]
 }
 
 fn triangle(blocks: &[TriBlock], place: u32) -> ([Vec3; 3], PrimId) {
@@ -256,11 +380,8 @@ impl Task for Settle<'_> {
             evaluated.rows[1].store(&mut high);
             for bit in bits(evaluated.mask) {
                 let (i, bit) = ((first + bit) % PACKET, bit % 8);
-                if evaluated.sure >> bit & 1 == 1 && high[bit] < f64::from(nearest.low[i]) {
-                    nearest.keep(packet, i, place, [low[bit], high[bit]]);
-                } else if evaluated.sure >> bit & 1 == 0 || low[bit] <= f64::from(packet.t_cull[i]) {
-                    nearest.decide(packet, blocks, i, place);
-                }
+                let sure = evaluated.sure >> bit & 1 == 1;
+                nearest.settle(packet, blocks, i, place, (sure, [low[bit], high[bit]]));
             }
         }
     }
@@ -268,6 +389,7 @@ impl Task for Settle<'_> {
 
 impl PacketRays {
     /// A ray by itself.
+    #[inline(always)]
     fn range(&self, i: usize) -> RayRange {
         let [[ox, oy, oz], [dx, dy, dz]] = [&self.origin32, &self.dir32];
         RayRange {
@@ -294,6 +416,49 @@ impl TriBlock {
 }
 
 impl TriBlock {
+    /// Ray i by itself against the triangles of the block, in f64; `None` where it misses all.
+    #[inline(always)]
+    fn weigh<S: Simd>(&self, packet: &PacketRays, i: usize) -> Option<Evaluated<S::D4>> {
+        let (origin, dir) = (splat3::<S>(&packet.origin32, i), splat3::<S>(&packet.dir32, i));
+        let volumes = Volumes::<S::D4>::new(self.widened::<S>(), origin, dir);
+        let open = volumes.open(S::D4::splat(packet.uv_error[i]));
+        if open == 0 {
+            return None;
+        }
+        let weights = Weights {
+            scale: S::D4::splat(BOUND * f64::from(packet.scale[i])),
+            t_near: S::D4::splat(f64::from(packet.t_near32[i])),
+            t_far: S::D4::splat(f64::from(packet.t_far[i])),
+            t_limit: S::D4::splat(f64::from(packet.t_cull[i])),
+        };
+        let evaluated = Evaluated::new(&volumes, open, &weights);
+        (evaluated.mask != 0).then_some(evaluated)
+    }
+
+    /// Whether a triangle of the block blocks ray i.
+    #[inline(always)]
+    pub(in crate::accel) fn blocks_one<S: Simd>(&self, packet: &PacketRays, i: usize) -> bool {
+        if packet.fast {
+            return self.test_fast::<S>(&packet.range(i), packet.t_far[i]).mask != 0;
+        }
+        let Some(evaluated) = self.weigh::<S>(packet, i) else { return false };
+        let mut mask = evaluated.mask;
+        while mask != 0 {
+            let lane = (mask.trailing_zeros() & 3) as usize;
+            mask &= mask - 1;
+            if self.prim(lane) != NO_PRIM && (evaluated.sure >> lane & 1 == 1 || self.stops_exactly(packet, i, lane)) {
+                return true;
+            }
+        }
+        false
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn stops_exactly(&self, packet: &PacketRays, i: usize, lane: usize) -> bool {
+        TriangleHit::exactly(&packet.range(i), self.corners(lane)).is_some()
+    }
+
     /// The active rays that a triangle of the block blocks.
     #[inline(always)]
     pub(in crate::accel) fn blocked<S: Simd>(&self, packet: &PacketRays, active: u32, tri: &mut Spread) -> u32 {
@@ -309,8 +474,12 @@ impl TriBlock {
             if open == 0 {
                 continue;
             }
-            let bounded = tri.bounded::<S::F>(lane, volumes);
             let (near, far) = (S::F::load(&packet.t_near32), S::F::load(&packet.t_far));
+            if packet.fast {
+                left &= !Divided::new(volumes, open, near, far).mask;
+                continue;
+            }
+            let bounded = tri.bounded::<S::F>(lane, volumes);
             let sure = open & bounded.sure & near.le(bounded.t_low) & bounded.t_high.le(far);
             left &= !sure;
             let beyond = bounded.solid & (far.lt(bounded.t_low) | bounded.t_high.lt(near));
@@ -350,8 +519,7 @@ impl Task for Doubt<'_> {
             blocked |= (evaluated.mask & evaluated.sure) << first;
             for bit in bits(evaluated.mask & !evaluated.sure) {
                 let i = (first + bit) % PACKET;
-                let hit = TriangleHit::exactly(&packet.range(i), block.corners(lane));
-                blocked |= u32::from(hit.is_some()) << i;
+                blocked |= u32::from(block.stops_exactly(packet, i, lane)) << i;
             }
         }
         blocked

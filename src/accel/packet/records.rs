@@ -3,7 +3,7 @@
 use super::{MODERATE, PACKET, PacketRays, Row};
 use crate::{
     accel::slabs,
-    geom::{Forms, Precision, Ray},
+    geom::{Forms, Precision, Ray, exact::BOUND},
     simd::{Lanes, Simd},
 };
 
@@ -35,6 +35,19 @@ impl PacketRays {
             self.derive::<S>(taken);
         }
         taken
+    }
+
+    /// What tests of single rays need besides.
+    #[inline(always)]
+    pub(in crate::accel) fn bound<S: Simd>(&mut self) {
+        let [x, y, z] = &self.origin32;
+        let reach = S::D::splat(f64::from(self.reach));
+        for first in (0..S::F::LEN).step_by(S::D::LEN) {
+            let (x, y, z) = (S::load_wide(&x[first..]), S::load_wide(&y[first..]), S::load_wide(&z[first..]));
+            let far = x.abs().max(y.abs()).max(z.abs());
+            let scale = S::load_wide(&self.scale[first..]) * S::D::splat(40.0 * BOUND);
+            (scale * reach * (reach + reach + far)).store(&mut self.uv_error[first..]);
+        }
     }
 
     /// True when the rays in `taken` do not all point nearly where the first does.

@@ -9,7 +9,7 @@ use crate::{
         packet::{Nearest, PacketRays, Spread, bits},
         run,
     },
-    geom::{Forms, Hit, Precision, Ray, Triangles},
+    geom::{Forms, Hit, Ray, Triangles},
     simd::{Lanes, Simd},
 };
 
@@ -54,7 +54,7 @@ pub(in crate::accel) fn closest<S: Simd, T: PacketTree>(
             if members.count_ones() <= FEW {
                 single |= members;
             } else {
-                let (together, root) = tree.start::<S>(&lines, (members, backward), Precision::Exact);
+                let (together, root) = tree.start::<S>(&lines, (members, backward), forms.nodes);
                 if let Some(root) = root {
                     closest_below::<S, T, _>(tree, together, root, &mut lines, &mut nearest, &mut tri);
                 }
@@ -108,7 +108,7 @@ pub(in crate::accel) fn occluded<S: Simd, T: PacketTree>(
             if members.count_ones() <= FEW {
                 single |= members;
             } else {
-                let (together, root) = tree.start::<S>(&lines, (members, backward), Precision::Exact);
+                let (together, root) = tree.start::<S>(&lines, (members, backward), forms.nodes);
                 if let Some(root) = root {
                     blocked |= occluded_below::<S, T, _>(tree, &together, root, &lines, &mut tri);
                 }
