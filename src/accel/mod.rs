@@ -31,7 +31,7 @@ pub use boxes::Visitor;
 pub use counter::ReadCounter;
 pub(crate) use eight::{EIGHT, Eight, EightPacket, EightRay, LEAF, ManyVisit, OneVisit, walk_many, walk_one};
 pub use packet::PACKET;
-pub(crate) use packet::PacketBoxes;
+pub(crate) use packet::{LanePacket, PacketBoxes};
 pub use query::{AnyHit, Closest, HitSink, TravRay};
 pub use registry::{AccelKind, AccelSpec, AnyAccel, SpecError};
 pub(crate) use rigid::{RigidPacket, RigidPlace, RigidTree};

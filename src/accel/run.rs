@@ -1,6 +1,10 @@
 //! The queries as tasks, so that a structure's kernel is compiled once a level and sink, not at every place that asks.
 
-use super::{Accel, AnyHit, Closest, Counter, HitSink, PACKET, TravRay, packet::bits};
+use super::{
+    Accel, AnyHit, Closest, Counter, HitSink, PACKET, TravRay,
+    packet::{LanePacket, bits},
+    wide::{coherent, packet::PacketTree},
+};
 use crate::{
     geom::{Forms, Hit, Ray, Triangles},
     glam::Vec3,
@@ -292,5 +296,42 @@ impl<A: Accel> Task for OccludedAllTask<'_, A> {
     #[inline(always)]
     fn run<S: Simd>(self) {
         self.accel.occluded_all::<S>(self.prims, self.rays, self.packet, self.forms, self.out);
+    }
+}
+
+/// [`AnyAccel::closest_lanes`](super::AnyAccel::closest_lanes).
+pub(super) struct ClosestLanes<'a, T, K> {
+    pub(super) tree: &'a T,
+    pub(super) packet: &'a mut LanePacket,
+    pub(super) open: u32,
+    pub(super) sink: &'a K,
+}
+
+impl<T: PacketTree, K: HitSink> Task for ClosestLanes<'_, T, K> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self) {
+        let Self { tree, packet, open, sink } = self;
+        let LanePacket { rays, nearest, tri } = packet;
+        coherent::closest_in::<S, T, K>(tree, rays, open, nearest, tri, sink);
+        nearest.leave(tree.blocks(), sink);
+    }
+}
+
+/// [`AnyAccel::occluded_lanes`](super::AnyAccel::occluded_lanes).
+pub(super) struct OccludedLanes<'a, T> {
+    pub(super) tree: &'a T,
+    pub(super) packet: &'a mut LanePacket,
+    pub(super) open: u32,
+}
+
+impl<T: PacketTree> Task for OccludedLanes<'_, T> {
+    type Output = u32;
+
+    #[inline(always)]
+    fn run<S: Simd>(self) -> u32 {
+        let LanePacket { rays, tri, .. } = self.packet;
+        coherent::occluded_in::<S, T>(self.tree, rays, self.open, tri)
     }
 }

@@ -199,6 +199,18 @@ pub(super) struct Lines {
 }
 
 impl Lines {
+    /// The slabs of one axis.
+    #[inline(always)]
+    pub(super) fn slab<S: Simd>(&self, axis: usize) -> Slab<S::F> {
+        let [entry_mul, entry_add, exit_mul, exit_add] = &self.rows[axis];
+        Slab {
+            entry_mul: S::F::load(entry_mul),
+            entry_add: S::F::load(entry_add),
+            exit_mul: S::F::load(exit_mul),
+            exit_add: S::F::load(exit_add),
+        }
+    }
+
     pub(super) const EMPTY: Self = Self { rows: [[[0.0; 16]; 4]; 3] };
 
     #[inline(always)]

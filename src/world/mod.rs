@@ -10,6 +10,7 @@
 mod batch;
 mod border;
 mod group;
+mod lanes;
 mod packet;
 mod query;
 mod sink;

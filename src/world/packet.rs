@@ -66,6 +66,9 @@ impl World {
     #[inline(always)]
     pub fn nearest_hits<S: Simd>(&self, rays: &[Ray], hits: &mut [Option<Hit>]) {
         assert!(rays.len() <= PACKET && rays.len() <= hits.len(), "at most {PACKET} rays, a hit for each");
+        if self.takes_lanes() && self.nearest_by_lane::<S>(rays, hits) {
+            return;
+        }
         hits.fill(None);
         let Some(packet) = Packet::new(rays, self.forms) else { return };
         let mut best: [Closest; PACKET] = std::array::from_fn(|i| Closest::new(&packet.rays[i]));
@@ -99,6 +102,11 @@ impl World {
     #[inline(always)]
     pub fn blocked<S: Simd>(&self, rays: &[Ray]) -> u32 {
         assert!(rays.len() <= PACKET, "at most {PACKET} rays");
+        if self.takes_lanes()
+            && let Some(blocked) = self.blocked_by_lane::<S>(rays)
+        {
+            return blocked;
+        }
         let Some(packet) = Packet::new(rays, self.forms) else { return 0 };
         let mut blocked = 0;
         if self.groups.len() <= FLAT {

@@ -10,7 +10,7 @@ use crate::{
         block::{BlockRay, TriBlock},
         query::SLACK,
         packet::PacketRays,
-        slabs::{self, Line, Lines},
+        slabs::{self, Line},
         topology::MAX_DEPTH,
         wide::{
             Place, Tree, WIDTH,
@@ -44,9 +44,9 @@ impl Boxes {
 
     /// Takes ray i of many.
     #[inline(always)]
-    pub(super) fn take(&mut self, lines: &Lines, rays: &PacketRays, i: usize) {
+    pub(super) fn take(&mut self, rays: &PacketRays, i: usize) {
         for axis in 0..3 {
-            let rows = &lines.rows[axis];
+            let rows = &rays.lines.rows[axis];
             self.line.entry_mul[axis] = rows[0][i];
             self.line.entry_add[axis] = rows[1][i];
             self.line.exit_mul[axis] = rows[2][i];

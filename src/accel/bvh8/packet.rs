@@ -11,14 +11,13 @@ use crate::{
         block::TriBlock,
         packet::PacketRays,
         query::SLACK,
-        slabs::{Extent, Slab},
+        slabs::Slab,
         wide::{
             WIDTH,
             packet::{Entry, GROW, PacketTree, Spread, Start, Together, spreads},
             walk,
         },
     },
-    geom::Precision,
     simd::{Lanes, Simd},
 };
 
@@ -46,7 +45,7 @@ pub(in crate::accel) struct Packet<S: Simd> {
 
 impl<S: Simd> Packet<S> {
     #[inline(always)]
-    fn new(packet: &PacketRays, (active, backward): (u32, [bool; 3]), reach: f32, nodes: Precision) -> Self {
+    fn new(packet: &PacketRays, (active, backward): (u32, [bool; 3])) -> Self {
         let [x, y, z] = spreads::<S>(packet, active);
         let ends = |spread: Spread, backward: bool| {
             let [entry, exit] = spread.ends(backward);
@@ -55,21 +54,13 @@ impl<S: Simd> Packet<S> {
                 End { origin: S::F8::splat(exit.0), inv: S::F8::splat(exit.1) },
             ]
         };
-        let ([ox, oy, oz], [dx, dy, dz]) = (&packet.origin32, &packet.dir32);
-        let origin = [S::F::load(ox), S::F::load(oy), S::F::load(oz)];
-        let dir = [S::F::load(dx), S::F::load(dy), S::F::load(dz)];
-        let extent = Extent::new(origin, dir, reach);
         Self {
             ends: [ends(x, backward[0]), ends(y, backward[1]), ends(z, backward[2])],
             backward: [usize::from(backward[0]), usize::from(backward[1]), usize::from(backward[2])],
             all_near: S::F8::splat(S::range(S::F::load(&packet.t_near32), active)[0]),
             all_far: S::F8::splat(S::range(S::F::load(&packet.t_cull), active)[1]),
             active,
-            slabs: [
-                Slab::new(origin[0], dir[0], &extent, nodes),
-                Slab::new(origin[1], dir[1], &extent, nodes),
-                Slab::new(origin[2], dir[2], &extent, nodes),
-            ],
+            slabs: [packet.lines.slab::<S>(0), packet.lines.slab::<S>(1), packet.lines.slab::<S>(2)],
             near: S::F::load(&packet.t_near32),
             limit: S::F::load(&packet.t_cull),
         }
@@ -163,8 +154,8 @@ impl PacketTree for Bvh8 {
     type Packet<S: Simd> = Packet<S>;
 
     #[inline(always)]
-    fn start<S: Simd>(&self, packet: &PacketRays, rays: (u32, [bool; 3]), nodes: Precision) -> Start<S, Self> {
-        let together = Packet::<S>::new(packet, rays, self.reach, nodes);
+    fn start<S: Simd>(&self, packet: &PacketRays, rays: (u32, [bool; 3])) -> Start<S, Self> {
+        let together = Packet::<S>::new(packet, rays);
         let root = Entry { word: Self::root(), mask: rays.0, mark: (), rays: together.near };
         (together, Some(root))
     }
@@ -177,7 +168,9 @@ pub(super) fn met_together<S: Simd>(ray: &TravRay, node: &Node, reach: f32) -> [
     let rays = [*ray; 3];
     let dir = ray.range().dir;
     let signs = [dir.x < 0.0, dir.y < 0.0, dir.z < 0.0];
-    let together = Packet::<S>::new(&PacketRays::new(&rays, reach), (7, signs), reach, Precision::Exact);
+    let mut packet = PacketRays::new(&rays, reach);
+    packet.prepare::<S>(crate::geom::Precision::Exact);
+    let together = Packet::<S>::new(&packet, (7, signs));
     let mut entries = [0.0; WIDTH];
     let all = together.all(node, (), &mut entries);
     let mut each = 0;

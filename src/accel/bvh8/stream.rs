@@ -11,10 +11,9 @@ use super::{
 };
 use crate::{
     accel::{
-        PACKET,
+        AnyHit, PACKET,
         packet::{Nearest, PacketRays, bits},
         run,
-        slabs::Lines,
         wide::{Place, WIDTH},
     },
     geom::{Forms, Hit, Ray, Triangles},
@@ -36,7 +35,6 @@ fn room(words: &mut [u32; MAX_STACK], at: usize) -> &mut [u32; WIDTH] {
 /// A vector of rays.
 struct Wing {
     rays: PacketRays,
-    lines: Lines,
     nearest: Nearest,
     /// Those that are answered here.
     taken: u32,
@@ -45,14 +43,14 @@ struct Wing {
 
 impl Wing {
     const EMPTY: Self =
-        Self { rays: PacketRays::EMPTY, lines: Lines::EMPTY, nearest: Nearest::NONE, taken: 0, blocked: 0 };
+        Self { rays: PacketRays::EMPTY, nearest: Nearest::NONE, taken: 0, blocked: 0 };
 
     #[inline(always)]
     fn load<S: Simd>(&mut self, tree: &Bvh8, rays: &[Ray], forms: Forms) {
         self.taken = self.rays.load::<S>(rays, tree.reach, forms);
         self.rays.bound::<S>();
-        self.lines.fill::<S>(&self.rays.origin32, &self.rays.dir32, tree.reach, forms.nodes);
-        self.nearest = Nearest::NONE;
+        self.rays.prepare::<S>(forms.nodes);
+        self.nearest.clear();
         self.blocked = 0;
     }
 }
@@ -77,7 +75,7 @@ impl Flight {
     #[inline(always)]
     fn begin(&mut self, wings: &[Wing; WINGS], wing: usize, lane: usize) {
         let from = &wings[wing % WINGS];
-        self.boxes.take(&from.lines, &from.rays, lane % PACKET);
+        self.boxes.take(&from.rays, lane % PACKET);
         (self.wing, self.lane) = (wing, lane);
         self.len = 1;
         (self.keys[0], self.links[0]) = (LEAST_KEY, Bvh8::root().bits());
@@ -134,7 +132,7 @@ impl Task for ClosestLeaf<'_> {
     fn run<S: Simd>(self) {
         let Self { tree, link, wing, lane } = self;
         for number in link.blocks() {
-            wing.nearest.offer_one::<S>(&mut wing.rays, &tree.blocks, number, lane);
+            wing.nearest.offer_one::<S, _>(&mut wing.rays, (&tree.blocks, number), lane, &AnyHit);
         }
     }
 }
@@ -258,7 +256,7 @@ impl Task for ClosestApart<'_> {
                 let next = rays.len().min(at + S::F::LEN);
                 let (rays, out) = (&rays[at..next], &mut out[at..next]);
                 at = next;
-                wing.nearest.answer::<S>(&wing.rays, &tree.blocks, out);
+                wing.nearest.answer::<S, _>(&wing.rays, &tree.blocks, &AnyHit, out);
                 for i in bits(!wing.taken & (u32::MAX >> (32 - rays.len()))) {
                     out[i] = run::closest_one::<S, Bvh8>(tree, prims, &rays[i], forms);
                 }

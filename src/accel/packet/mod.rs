@@ -1,15 +1,17 @@
 //! Packets: up to sixteen rays, one to a lane.
 
 mod boxes;
+mod lanes;
 mod leaf;
 mod nearest;
 mod records;
 
 pub(crate) use boxes::PacketBoxes;
+pub(crate) use lanes::LanePacket;
 pub(in crate::accel) use leaf::Spread;
 pub(in crate::accel) use nearest::Nearest;
 
-use super::{Closest, TravRay};
+use super::{Closest, TravRay, slabs::Lines};
 use crate::geom::Precision;
 
 /// Most rays in a packet.
@@ -36,6 +38,8 @@ pub(in crate::accel) struct PacketRays {
     scale: Row,
     /// Bound on the errors of U, V and W of every triangle within the reach, as [`BlockRay::new`](super::block::BlockRay::new) derives it.
     uv_error: [f64; PACKET],
+    /// Where the rays cross planes, once [`PacketRays::prepare`] was called.
+    pub(in crate::accel) lines: Lines,
     /// Bits of the rays that run downward, by axis.
     pub(in crate::accel) backward: [u32; 3],
     common_origin: bool,
@@ -70,6 +74,7 @@ impl PacketRays {
         t_far: [0.0; PACKET],
         scale: [0.0; PACKET],
         uv_error: [0.0; PACKET],
+        lines: Lines::EMPTY,
         backward: [0; 3],
         common_origin: false,
         longest: 0.0,

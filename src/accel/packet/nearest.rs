@@ -3,9 +3,10 @@
 //! A triangle that is surely hit, by volumes farther from 0 than their errors, and surely before the best so far takes its place by that alone; one that
 //! surely is neither falls away. What is left is tested in f64, and what that leaves in doubt, by integers.
 
-use super::{BOUND32, PACKET, PacketRays, bits, leaf::{Spread, narrow3, wide3, widely}};
+use super::{PACKET, PacketRays, bits, leaf::{Spread, narrow3, wide3, widely}};
 use crate::{
     accel::{
+        HitSink,
         block::{Evaluated, NO_PRIM, TriBlock, Volumes, Weights},
         fast::Divided,
         query::{SLACK, round_up},
@@ -21,6 +22,16 @@ use crate::{
 /// No triangle yet.
 const NOWHERE: u32 = u32::MAX;
 
+/// A triangle of a structure that was left.
+const ELSEWHERE: u32 = u32::MAX - 1;
+
+/// A triangle, and the key that orders it among those of equal t.
+#[derive(Clone, Copy)]
+struct Known {
+    corners: [Vec3; 3],
+    key: (InstanceId, PrimId),
+}
+
 /// The best of each ray of a packet.
 #[derive(Clone, Copy)]
 pub(in crate::accel) struct Nearest {
@@ -30,6 +41,8 @@ pub(in crate::accel) struct Nearest {
     place: [u32; PACKET],
     /// u and v where leaves are tested fast; t is [`PacketRays::t_cull`].
     fast: [[f32; PACKET]; 2],
+    /// The best of structures that were left.
+    elsewhere: [Known; PACKET],
 }
 
 /// The least f32 above `4 * 2^-23`, what the roundings of t amount to.
@@ -37,17 +50,46 @@ const ROUNDING: f32 = 4.0 * f32::EPSILON;
 
 impl Nearest {
     /// Nothing hit yet.
-    pub(in crate::accel) const NONE: Self = Self { low: [f32::INFINITY; PACKET], place: [NOWHERE; PACKET], fast: [[0.0; PACKET]; 2] };
+    pub(in crate::accel) const NONE: Self = Self {
+        low: [f32::INFINITY; PACKET],
+        place: [NOWHERE; PACKET],
+        fast: [[0.0; PACKET]; 2],
+        elsewhere: [Known { corners: [Vec3::ZERO; 3], key: (InstanceId(0), PrimId(0)) }; PACKET],
+    };
+
+    /// Forgets all hits.
+    #[inline(always)]
+    pub(in crate::accel) fn clear(&mut self) {
+        self.low = [f32::INFINITY; PACKET];
+        self.place = [NOWHERE; PACKET];
+    }
+
+    /// Leaves the structure of `blocks`: what was found in it is kept beside what other structures may hold.
+    #[inline(always)]
+    pub(in crate::accel) fn leave<K: HitSink>(&mut self, blocks: &[TriBlock], sink: &K) {
+        for i in 0..PACKET {
+            if self.place[i] < ELSEWHERE {
+                self.elsewhere[i] = known(blocks, self.place[i], sink);
+                self.place[i] = ELSEWHERE;
+            }
+        }
+    }
+
+    /// The best of a ray that has one.
+    #[inline(always)]
+    fn best<K: HitSink>(&self, blocks: &[TriBlock], i: usize, sink: &K) -> Known {
+        if self.place[i] == ELSEWHERE { self.elsewhere[i] } else { known(blocks, self.place[i], sink) }
+    }
 
     /// Offers the triangles of block `number` to the active rays.
     #[inline(always)]
-    pub(in crate::accel) fn offer<S: Simd>(
+    pub(in crate::accel) fn offer<S: Simd, K: HitSink>(
         &mut self,
         packet: &mut PacketRays,
-        blocks: &[TriBlock],
-        number: usize,
+        (blocks, number): (&[TriBlock], usize),
         active: u32,
         tri: &mut Spread,
+        sink: &K,
     ) {
         let block = &blocks[number];
         tri.fill::<S>(block, packet);
@@ -68,7 +110,14 @@ impl Nearest {
                 let divided = Divided::new(volumes, open, near, limit);
                 let nearer = divided.mask & divided.t.lt(limit);
                 self.keep_fast::<S>(packet, &divided, nearer, place);
-                self.keep_equals::<S>(packet, blocks, &divided, divided.mask & !nearer, place);
+                let equal = divided.mask & !nearer;
+                if equal != 0 {
+                    let mut kept = 0;
+                    for i in bits(equal) {
+                        kept |= u32::from(self.gives_way(blocks, i % PACKET, place, sink)) << i;
+                    }
+                    self.keep_fast::<S>(packet, &divided, kept, place);
+                }
                 continue;
             }
             let bounded = tri.bounded::<S::F>(lane, volumes);
@@ -87,7 +136,7 @@ impl Nearest {
             }
             let doubtful = open & !sure;
             if doubtful != 0 {
-                S::call(Settle { nearest: self, packet, blocks, place, doubtful });
+                S::call(Settle { nearest: self, packet, blocks, place, doubtful, sink });
             }
         }
     }
@@ -101,38 +150,19 @@ impl Nearest {
         S::write_where(kept, place, &mut self.place);
     }
 
-    /// Keeps those of equal t that have no best yet or one of a higher number.
-    #[inline(always)]
-    fn keep_equals<S: Simd>(
-        &mut self,
-        packet: &mut PacketRays,
-        blocks: &[TriBlock],
-        hit: &Divided<S::F>,
-        equal: u32,
-        place: u32,
-    ) {
-        if equal != 0 {
-            let mut kept = 0;
-            for i in bits(equal) {
-                kept |= u32::from(self.gives_way(blocks, i % PACKET, place)) << i;
-            }
-            self.keep_fast::<S>(packet, hit, kept, place);
-        }
-    }
-
-    /// True when ray i has no best or one whose number is above that of another triangle.
-    fn gives_way(&self, blocks: &[TriBlock], i: usize, place: u32) -> bool {
-        self.place[i] == NOWHERE || triangle(blocks, place).1 < triangle(blocks, self.place[i]).1
+    /// True when ray i has no best or one whose key is above that of another triangle.
+    fn gives_way<K: HitSink>(&self, blocks: &[TriBlock], i: usize, place: u32, sink: &K) -> bool {
+        self.place[i] == NOWHERE || known(blocks, place, sink).key < self.best(blocks, i, sink).key
     }
 
     /// Offers the triangles of block `number` to ray i by itself.
     #[inline(always)]
-    pub(in crate::accel) fn offer_one<S: Simd>(
+    pub(in crate::accel) fn offer_one<S: Simd, K: HitSink>(
         &mut self,
         packet: &mut PacketRays,
-        blocks: &[TriBlock],
-        number: usize,
+        (blocks, number): (&[TriBlock], usize),
         i: usize,
+        sink: &K,
     ) {
         let block = &blocks[number];
         if packet.fast {
@@ -142,7 +172,7 @@ impl Nearest {
                 #[expect(clippy::cast_possible_truncation, reason = "there are fewer than 2^28 blocks")]
                 let place = (4 * number + lane) as u32;
                 let limit = packet.t_cull[i];
-                if block.prim(lane % 4) != NO_PRIM && (t < limit || t <= limit && self.gives_way(blocks, i, place)) {
+                if block.prim(lane % 4) != NO_PRIM && (t < limit || t <= limit && self.gives_way(blocks, i, place, sink)) {
                     (packet.t_cull[i], self.fast[0][i], self.fast[1][i]) = (t, u, v);
                     self.place[i] = place;
                 }
@@ -161,39 +191,46 @@ impl Nearest {
                 #[expect(clippy::cast_possible_truncation, reason = "there are fewer than 2^28 blocks")]
                 let place = (4 * number + lane) as u32;
                 let sure = evaluated.sure >> lane & 1 == 1;
-                self.settle(packet, blocks, i, place, (sure, [low[lane], high[lane]]));
+                self.settle(packet, blocks, (i, place), (sure, [low[lane], high[lane]]), sink);
             }
         }
     }
 
     /// Keeps a triangle that f64 finds hit by ray i, surely or not, if it is the nearest.
     #[inline(always)]
-    fn settle(
+    fn settle<K: HitSink>(
         &mut self,
         packet: &mut PacketRays,
         blocks: &[TriBlock],
-        i: usize,
-        place: u32,
+        (i, place): (usize, u32),
         (sure, [low, high]): (bool, [f64; 2]),
+        sink: &K,
     ) {
         if sure && high < f64::from(self.low[i]) {
             self.keep(packet, i, place, [low, high]);
         } else if !sure || low <= f64::from(packet.t_cull[i]) {
-            self.decide(packet, blocks, i, place);
+            self.decide(packet, blocks, i, place, sink);
         }
     }
 
     /// Decides between the best of a ray and another triangle by exact numbers.
     #[cold]
     #[inline(never)]
-    fn decide(&mut self, packet: &mut PacketRays, blocks: &[TriBlock], i: usize, place: u32) {
+    fn decide<K: HitSink>(
+        &mut self,
+        packet: &mut PacketRays,
+        blocks: &[TriBlock],
+        i: usize,
+        place: u32,
+        sink: &K,
+    ) {
         let ray = packet.range(i);
-        let (corners, prim) = triangle(blocks, place);
+        let Known { corners, key } = known(blocks, place, sink);
         let Some(hit) = TriangleHit::test(&ray, corners) else { return };
         if self.place[i] != NOWHERE {
-            let (corners, best) = triangle(blocks, self.place[i]);
-            if let Some(other) = TriangleHit::test(&ray, corners)
-                && hit.cmp_t(&other, &ray).then(prim.cmp(&best)).is_gt()
+            let best = self.best(blocks, i, sink);
+            if let Some(other) = TriangleHit::test(&ray, best.corners)
+                && hit.cmp_t(&other, &ray).then(key.cmp(&best.key)).is_gt()
             {
                 return;
             }
@@ -219,23 +256,31 @@ impl Nearest {
     }
 
     #[inline(always)]
-    fn answer_fast(&self, packet: &PacketRays, blocks: &[TriBlock], found: u32, out: &mut [Option<Hit>]) {
+    fn answer_fast<K: HitSink>(
+        &self,
+        packet: &PacketRays,
+        blocks: &[TriBlock],
+        found: u32,
+        sink: &K,
+        out: &mut [Option<Hit>],
+    ) {
         for i in 0..out.len().min(PACKET) {
             out[i] = None;
             if found >> i & 1 == 1 {
                 let (t, u, v) = (packet.t_cull[i], self.fast[0][i], self.fast[1][i]);
-                let (_, prim) = triangle(blocks, self.place[i]);
-                out[i] = Some(Hit { t, u, v, prim, instance: InstanceId(0) });
+                let (instance, prim) = self.best(blocks, i, sink).key;
+                out[i] = Some(Hit { t, u, v, prim, instance });
             }
         }
     }
 
-    /// The hits of all rays, rounded, into `out`.
+    /// The hits of all rays, rounded, into `out`; `blocks` and `sink` are those of the structure that was not left, if any.
     #[inline(always)]
-    pub(in crate::accel) fn answer<S: Simd>(
+    pub(in crate::accel) fn answer<S: Simd, K: HitSink>(
         &self,
         packet: &PacketRays,
         blocks: &[TriBlock],
+        sink: &K,
         out: &mut [Option<Hit>],
     ) {
         let found = self.found() & (u32::MAX >> (32 - out.len()));
@@ -244,15 +289,23 @@ impl Nearest {
             return;
         }
         if packet.fast {
-            self.answer_fast(packet, blocks, found, out);
+            self.answer_fast(packet, blocks, found, sink, out);
             return;
         }
         let mut corners = [[[0.0; PACKET]; 3]; 3];
-        let mut prims = [PrimId(0); PACKET];
+        let mut keys = [(InstanceId(0), PrimId(0)); PACKET];
         for i in bits(found) {
             let i = i % PACKET;
-            let place = self.place[i] as usize;
-            prims[i] = blocks[place / 4].spread(place % 4, &mut corners, i);
+            if self.place[i] == ELSEWHERE {
+                let Known { corners: [a, b, c], key } = &self.elsewhere[i];
+                for (rows, corner) in corners.iter_mut().zip([a, b, c]) {
+                    (rows[0][i], rows[1][i], rows[2][i]) = (corner.x, corner.y, corner.z);
+                }
+                keys[i] = *key;
+            } else {
+                let place = self.place[i] as usize;
+                keys[i] = sink.key(blocks[place / 4].spread(place % 4, &mut corners, i));
+            }
         }
         let mut tuv = [[0.0; PACKET]; 3];
         let mut rounded = 0;
@@ -264,11 +317,12 @@ impl Nearest {
         }
         let [t, u, v] = &tuv;
         for i in 0..out.len().min(PACKET) {
-            let hit = Hit { t: t[i], u: u[i], v: v[i], prim: prims[i], instance: InstanceId(0) };
+            let (instance, prim) = keys[i];
+            let hit = Hit { t: t[i], u: u[i], v: v[i], prim, instance };
             out[i] = if found >> i & 1 == 1 { Some(hit) } else { None };
         }
         for i in bits(found & !rounded) {
-            out[i] = exactly(packet, blocks, i, self.place[i]);
+            out[i] = exactly(packet, i, &self.best(blocks, i, sink));
         }
     }
 }
@@ -279,18 +333,20 @@ fn splat3<S: Simd>([x, y, z]: &[[f32; PACKET]; 3], i: usize) -> [S::D4; 3] {
     [S::D4::splat(f64::from(x[i])), S::D4::splat(f64::from(y[i])), S::D4::splat(f64::from(z[i]))]
 }
 
-fn triangle(blocks: &[TriBlock], place: u32) -> ([Vec3; 3], PrimId) {
+/// The triangle at a place.
+#[inline(always)]
+fn known<K: HitSink>(blocks: &[TriBlock], place: u32, sink: &K) -> Known {
     let (block, lane) = (&blocks[place as usize / 4], place as usize % 4);
-    (block.corners(lane), PrimId(block.prim(lane)))
+    Known { corners: block.corners(lane), key: sink.key(PrimId(block.prim(lane))) }
 }
 
 #[cold]
 #[inline(never)]
-fn exactly(packet: &PacketRays, blocks: &[TriBlock], i: usize, place: u32) -> Option<Hit> {
-    let (corners, prim) = triangle(blocks, place);
+fn exactly(packet: &PacketRays, i: usize, best: &Known) -> Option<Hit> {
     let range = packet.range(i);
-    let [t, u, v] = TriangleHit::test(&range, corners)?.tuv(&range);
-    Some(Hit { t, u, v, prim, instance: InstanceId(0) })
+    let [t, u, v] = TriangleHit::test(&range, best.corners)?.tuv(&range);
+    let (instance, prim) = best.key;
+    Some(Hit { t, u, v, prim, instance })
 }
 
 /// Rounds t, u and v of the rays in `part`, counted from number `first` on, and their triangles: the rays whose numbers f64 settles.
@@ -354,20 +410,21 @@ impl Spread {
 }
 
 /// Tests one triangle against rays that f32 leaves in doubt.
-struct Settle<'a> {
+struct Settle<'a, K> {
     nearest: &'a mut Nearest,
     packet: &'a mut PacketRays,
     blocks: &'a [TriBlock],
     place: u32,
     doubtful: u32,
+    sink: &'a K,
 }
 
-impl Task for Settle<'_> {
+impl<K: HitSink> Task for Settle<'_, K> {
     type Output = ();
 
     #[inline(always)]
     fn run<S: Simd>(self) {
-        let Self { nearest, packet, blocks, place, doubtful } = self;
+        let Self { nearest, packet, blocks, place, doubtful, sink } = self;
         let (block, lane) = (&blocks[place as usize / 4], place as usize % 4);
         for first in (0..S::F::LEN).step_by(S::D::LEN) {
             let part = doubtful >> first & S::D::ALL;
@@ -381,7 +438,7 @@ impl Task for Settle<'_> {
             for bit in bits(evaluated.mask) {
                 let (i, bit) = ((first + bit) % PACKET, bit % 8);
                 let sure = evaluated.sure >> bit & 1 == 1;
-                nearest.settle(packet, blocks, i, place, (sure, [low[bit], high[bit]]));
+                nearest.settle(packet, blocks, (i, place), (sure, [low[bit], high[bit]]), sink);
             }
         }
     }

@@ -37,6 +37,13 @@ impl PacketRays {
         taken
     }
 
+    /// Makes the lines that boxes within the reach are tested with.
+    #[inline(always)]
+    pub(in crate::accel) fn prepare<S: Simd>(&mut self, nodes: Precision) {
+        let Self { lines, origin32, dir32, reach, .. } = self;
+        lines.fill::<S>(origin32, dir32, *reach, nodes);
+    }
+
     /// What tests of single rays need besides.
     #[inline(always)]
     pub(in crate::accel) fn bound<S: Simd>(&mut self) {

@@ -6,15 +6,13 @@ use super::{
 };
 use crate::{
     accel::{
+        AnyHit, HitSink,
         packet::{Nearest, PacketRays, Spread, bits},
         run,
     },
     geom::{Forms, Hit, Ray, Triangles},
     simd::{Lanes, Simd},
 };
-
-/// Up to this many rays are walked one by one.
-const FEW: u32 = 2;
 
 /// As [`Accel::closest_all`](crate::accel::Accel::closest_all), each `width` rays together; `apart` answers runs of those that point apart.
 #[inline(always)]
@@ -28,6 +26,7 @@ pub(in crate::accel) fn closest<S: Simd, T: PacketTree>(
     apart: impl Fn(&[Ray], &mut [Option<Hit>]),
 ) {
     let (mut lines, mut tri) = (PacketRays::EMPTY, Spread::EMPTY);
+    let mut nearest = Nearest::NONE;
     let (mut at, mut end) = (0, 0);
     // Rays from here to the packet point apart.
     let mut waiting = 0;
@@ -37,7 +36,7 @@ pub(in crate::accel) fn closest<S: Simd, T: PacketTree>(
         let next = end.min(at + S::F::LEN);
         let (first, packet) = (at, &rays[at..next]);
         at = next;
-        let mut left = lines.load::<S>(packet, tree.reach(), forms);
+        let left = lines.load::<S>(packet, tree.reach(), forms);
         if left == 0 || lines.points_apart::<S>(left) {
             continue;
         }
@@ -46,22 +45,11 @@ pub(in crate::accel) fn closest<S: Simd, T: PacketTree>(
         }
         waiting = next;
         let out = &mut out[first..next];
-        let mut single = !left;
-        let mut nearest = Nearest::NONE;
-        while left != 0 {
-            let (members, backward) = lines.group(left);
-            left &= !members;
-            if members.count_ones() <= FEW {
-                single |= members;
-            } else {
-                let (together, root) = tree.start::<S>(&lines, (members, backward), forms.nodes);
-                if let Some(root) = root {
-                    closest_below::<S, T, _>(tree, together, root, &mut lines, &mut nearest, &mut tri);
-                }
-            }
-        }
-        nearest.answer::<S>(&lines, tree.blocks(), out);
-        for i in bits(single & (u32::MAX >> (32 - packet.len()))) {
+        nearest.clear();
+        lines.prepare::<S>(forms.nodes);
+        closest_in::<S, T, _>(tree, &mut lines, left, &mut nearest, &mut tri, &AnyHit);
+        nearest.answer::<S, _>(&lines, tree.blocks(), &AnyHit, out);
+        for i in bits(!left & (u32::MAX >> (32 - packet.len()))) {
             out[i] = run::closest_one::<S, T>(tree, prims, &packet[i], forms);
         }
     }
@@ -91,7 +79,7 @@ pub(in crate::accel) fn occluded<S: Simd, T: PacketTree>(
         let next = end.min(at + S::F::LEN);
         let (first, packet) = (at, &rays[at..next]);
         at = next;
-        let mut left = lines.load::<S>(packet, tree.reach(), forms);
+        let left = lines.load::<S>(packet, tree.reach(), forms);
         if left == 0 || lines.points_apart::<S>(left) {
             continue;
         }
@@ -100,24 +88,12 @@ pub(in crate::accel) fn occluded<S: Simd, T: PacketTree>(
         }
         waiting = next;
         let out = &mut out[first..next];
-        let mut single = !left;
-        let mut blocked = 0;
-        while left != 0 {
-            let (members, backward) = lines.group(left);
-            left &= !members;
-            if members.count_ones() <= FEW {
-                single |= members;
-            } else {
-                let (together, root) = tree.start::<S>(&lines, (members, backward), forms.nodes);
-                if let Some(root) = root {
-                    blocked |= occluded_below::<S, T, _>(tree, &together, root, &lines, &mut tri);
-                }
-            }
-        }
+        lines.prepare::<S>(forms.nodes);
+        let blocked = occluded_in::<S, T>(tree, &lines, left, &mut tri);
         for (i, out) in out.iter_mut().enumerate() {
             *out = blocked >> i & 1 == 1;
         }
-        for i in bits(single & (u32::MAX >> (32 - packet.len()))) {
+        for i in bits(!left & (u32::MAX >> (32 - packet.len()))) {
             out[i] = run::occluded_one::<S, T>(tree, prims, &packet[i], forms);
         }
     }
@@ -126,15 +102,56 @@ pub(in crate::accel) fn occluded<S: Simd, T: PacketTree>(
     }
 }
 
+/// Offers the triangles of a tree to the prepared rays in `left`.
+#[inline(always)]
+pub(in crate::accel) fn closest_in<S: Simd, T: PacketTree, K: HitSink>(
+    tree: &T,
+    lines: &mut PacketRays,
+    mut left: u32,
+    nearest: &mut Nearest,
+    tri: &mut Spread,
+    sink: &K,
+) {
+    while left != 0 {
+        let (members, backward) = lines.group(left);
+        left &= !members;
+        let (together, root) = tree.start::<S>(lines, (members, backward));
+        if let Some(root) = root {
+            closest_below::<S, T, _, _>(tree, together, root, lines, nearest, tri, sink);
+        }
+    }
+}
+
+/// The prepared rays in `left` that something of a tree blocks.
+#[inline(always)]
+pub(in crate::accel) fn occluded_in<S: Simd, T: PacketTree>(
+    tree: &T,
+    lines: &PacketRays,
+    mut left: u32,
+    tri: &mut Spread,
+) -> u32 {
+    let mut blocked = 0;
+    while left != 0 {
+        let (members, backward) = lines.group(left);
+        left &= !members;
+        let (together, root) = tree.start::<S>(lines, (members, backward));
+        if let Some(root) = root {
+            blocked |= occluded_below::<S, T, _>(tree, &together, root, lines, tri);
+        }
+    }
+    blocked
+}
+
 /// Offers the triangles below a node to the rays of a packet.
 #[inline(always)]
-fn closest_below<S: Simd, T: PacketTree, P: Together<S, T>>(
+fn closest_below<S: Simd, T: PacketTree, P: Together<S, T>, K: HitSink>(
     tree: &T,
     mut together: P,
     start: Entry<S, T, P>,
     lines: &mut PacketRays,
     nearest: &mut Nearest,
     tri: &mut Spread,
+    sink: &K,
 ) {
     let mut kids = P::kids();
     let mut stack = Stack::<S, T, P>::new();
@@ -149,7 +166,7 @@ fn closest_below<S: Simd, T: PacketTree, P: Together<S, T>>(
             for (number, block) in (entry.word.index()..).zip(blocks) {
                 let mask = mask & together.meeting(block, &entry.rays);
                 if mask != 0 {
-                    nearest.offer::<S>(lines, tree.blocks(), number, mask, tri);
+                    nearest.offer::<S, K>(lines, (tree.blocks(), number), mask, tri, sink);
                 }
             }
             together.limit(lines);

@@ -5,11 +5,11 @@ use crate::{
     accel::{
         Accel, Closest, Counter, HitSink, TravRay,
         block::TriBlock,
-        packet::{PACKET, PacketRays, bits},
+        packet::{PacketRays, bits},
         run, slabs,
         topology::MAX_DEPTH,
     },
-    geom::{Precision, Triangles},
+    geom::Triangles,
     simd::{self, Lanes, Simd},
 };
 
@@ -89,8 +89,8 @@ pub(in crate::accel) trait PacketTree: Tree + Accel {
     /// Its packets.
     type Packet<S: Simd>: Together<S, Self>;
 
-    /// A packet of rays with `backward` signs, and the root for those that may meet it.
-    fn start<S: Simd>(&self, packet: &PacketRays, rays: (u32, [bool; 3]), nodes: Precision) -> Start<S, Self>;
+    /// A prepared packet of rays with `backward` signs, and the root for those that may meet it.
+    fn start<S: Simd>(&self, packet: &PacketRays, rays: (u32, [bool; 3])) -> Start<S, Self>;
 }
 
 /// As [`Accel::closest_packet`].
@@ -114,10 +114,11 @@ pub(in crate::accel) fn closest_packet<S: Simd, T: PacketTree, C: Counter, H: Hi
                 continue;
             }
             let mut packet = PacketRays::new(rays, tree.reach());
+            packet.prepare::<S>(rays[0].forms().nodes);
             for (i, best) in best.iter().enumerate() {
                 packet.set_limit(i, best);
             }
-            let (together, root) = tree.start::<S>(&packet, (members, backward), rays[0].forms().nodes);
+            let (together, root) = tree.start::<S>(&packet, (members, backward));
             if let Some(root) = root {
                 closest::<S, T, _, C, H>(tree, together, root, rays, &mut packet, (&mut *best, sinks), count);
             }
@@ -145,8 +146,9 @@ pub(in crate::accel) fn occluded_packet<S: Simd, T: PacketTree, C: Counter, H: H
                 blocked |= run::occluded_singly::<S, T, C, H>(tree, prims, rays, members, sinks, count) << start;
                 continue;
             }
-            let packet = PacketRays::new(rays, tree.reach());
-            let (together, root) = tree.start::<S>(&packet, (members, backward), rays[0].forms().nodes);
+            let mut packet = PacketRays::new(rays, tree.reach());
+            packet.prepare::<S>(rays[0].forms().nodes);
+            let (together, root) = tree.start::<S>(&packet, (members, backward));
             if let Some(root) = root {
                 blocked |= occluded::<S, T, _, C, H>(tree, &together, root, rays, &packet, sinks, count) << start;
             }

@@ -18,7 +18,6 @@ use crate::{
             walk,
         },
     },
-    geom::Precision,
     simd::{Lanes, Simd},
 };
 
@@ -170,7 +169,6 @@ impl<const K: usize> PacketTree for Wide<K> {
         &self,
         packet: &PacketRays,
         (active, backward): (u32, [bool; 3]),
-        _nodes: Precision,
     ) -> Start<S, Self> {
         let together = Packet::<S>::new(packet, active, backward);
         let rays = together.slabs.clipped(&self.bounds);
