@@ -147,12 +147,7 @@ pub(super) fn closest_all<S: Simd, A: Accel>(
 
 /// The closest hit of one ray.
 #[inline(always)]
-pub(super) fn closest_one<S: Simd, A: Accel>(
-    accel: &A,
-    prims: &Triangles<'_>,
-    ray: &Ray,
-    forms: Forms,
-) -> Option<Hit> {
+pub(super) fn closest_one<S: Simd, A: Accel>(accel: &A, prims: &Triangles<'_>, ray: &Ray, forms: Forms) -> Option<Hit> {
     let ray = TravRay::with_forms(ray, forms)?;
     let mut best = Closest::new(&ray);
     S::call(ClosestTask { accel, prims, ray: &ray, best: &mut best, sink: &AnyHit, count: &mut () });

@@ -8,8 +8,8 @@ use crate::{
     accel::{
         Closest, Counter, HitSink, TravRay,
         block::{BlockRay, TriBlock},
-        query::SLACK,
         packet::PacketRays,
+        query::SLACK,
         slabs::{self, Line},
         topology::MAX_DEPTH,
         wide::{

@@ -257,7 +257,8 @@ impl Accel for Bvh8 {
         if packet == 1 {
             S::call(ClosestApart { tree: self, prims, rays, forms, out });
         } else {
-            let apart = |rays: &[Ray], out: &mut [Option<Hit>]| S::call(ClosestApart { tree: self, prims, rays, forms, out });
+            let apart =
+                |rays: &[Ray], out: &mut [Option<Hit>]| S::call(ClosestApart { tree: self, prims, rays, forms, out });
             coherent::closest::<S, Self>(self, prims, rays, packet, forms, out, apart);
         }
     }

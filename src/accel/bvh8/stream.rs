@@ -42,8 +42,7 @@ struct Wing {
 }
 
 impl Wing {
-    const EMPTY: Self =
-        Self { rays: PacketRays::EMPTY, nearest: Nearest::NONE, taken: 0, blocked: 0 };
+    const EMPTY: Self = Self { rays: PacketRays::EMPTY, nearest: Nearest::NONE, taken: 0, blocked: 0 };
 
     #[inline(always)]
     fn load<S: Simd>(&mut self, tree: &Bvh8, rays: &[Ray], forms: Forms) {

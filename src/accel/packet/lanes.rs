@@ -1,6 +1,10 @@
 use super::{Nearest, PacketRays, Spread};
 use crate::{
-    accel::{AnyAccel, HitSink, query::SLACK, run::{ClosestLanes, OccludedLanes}},
+    accel::{
+        AnyAccel, HitSink,
+        query::SLACK,
+        run::{ClosestLanes, OccludedLanes},
+    },
     geom::{Aabb, Forms, Hit, Ray},
     simd::{Lanes, Simd},
 };

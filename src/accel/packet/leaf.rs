@@ -18,9 +18,7 @@ use super::{BOUND32, FEW, PACKET, PacketRays, TINY, bits};
 use crate::{
     accel::{
         Closest, Counter, HitSink, TravRay,
-        block::{
-            BlockRay, Evaluated, NO_PRIM, Spilled, TriBlock, Volumes, Weights, cross, dot, norm1, splat3, sub,
-        },
+        block::{BlockRay, Evaluated, NO_PRIM, Spilled, TriBlock, Volumes, Weights, cross, dot, norm1, splat3, sub},
         fast::{Divided, accepts},
         query::blocks,
     },
@@ -150,7 +148,13 @@ pub(super) fn wide3<S: Simd>(rows: &[[f32; PACKET]; 3], first: usize) -> [S::D; 
 
 /// Triangle `lane` of a block against the rays in `open`, counted from number `first` on, in f64.
 #[inline(always)]
-pub(super) fn widely<S: Simd>(block: &TriBlock, lane: usize, packet: &PacketRays, first: usize, open: u32) -> Evaluated<S::D> {
+pub(super) fn widely<S: Simd>(
+    block: &TriBlock,
+    lane: usize,
+    packet: &PacketRays,
+    first: usize,
+    open: u32,
+) -> Evaluated<S::D> {
     let [a, b, c] = block.corners(lane);
     let (a, b, c) = (a.as_dvec3().to_array(), b.as_dvec3().to_array(), c.as_dvec3().to_array());
     let (origin, dir) = (wide3::<S>(&packet.origin32, first), wide3::<S>(&packet.dir32, first));

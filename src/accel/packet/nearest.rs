@@ -3,7 +3,10 @@
 //! A triangle that is surely hit, by volumes farther from 0 than their errors, and surely before the best so far takes its place by that alone; one that
 //! surely is neither falls away. What is left is tested in f64, and what that leaves in doubt, by integers.
 
-use super::{PACKET, PacketRays, bits, leaf::{Spread, narrow3, wide3, widely}};
+use super::{
+    PACKET, PacketRays, bits,
+    leaf::{Spread, narrow3, wide3, widely},
+};
 use crate::{
     accel::{
         HitSink,
@@ -172,7 +175,9 @@ impl Nearest {
                 #[expect(clippy::cast_possible_truncation, reason = "there are fewer than 2^28 blocks")]
                 let place = (4 * number + lane) as u32;
                 let limit = packet.t_cull[i];
-                if block.prim(lane % 4) != NO_PRIM && (t < limit || t <= limit && self.gives_way(blocks, i, place, sink)) {
+                if block.prim(lane % 4) != NO_PRIM
+                    && (t < limit || t <= limit && self.gives_way(blocks, i, place, sink))
+                {
                     (packet.t_cull[i], self.fast[0][i], self.fast[1][i]) = (t, u, v);
                     self.place[i] = place;
                 }
@@ -216,14 +221,7 @@ impl Nearest {
     /// Decides between the best of a ray and another triangle by exact numbers.
     #[cold]
     #[inline(never)]
-    fn decide<K: HitSink>(
-        &mut self,
-        packet: &mut PacketRays,
-        blocks: &[TriBlock],
-        i: usize,
-        place: u32,
-        sink: &K,
-    ) {
+    fn decide<K: HitSink>(&mut self, packet: &mut PacketRays, blocks: &[TriBlock], i: usize, place: u32, sink: &K) {
         let ray = packet.range(i);
         let Known { corners, key } = known(blocks, place, sink);
         let Some(hit) = TriangleHit::test(&ray, corners) else { return };

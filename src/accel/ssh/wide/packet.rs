@@ -165,15 +165,14 @@ impl<const K: usize> PacketTree for Wide<K> {
     type Packet<S: Simd> = Packet<S>;
 
     #[inline(always)]
-    fn start<S: Simd>(
-        &self,
-        packet: &PacketRays,
-        (active, backward): (u32, [bool; 3]),
-    ) -> Start<S, Self> {
+    fn start<S: Simd>(&self, packet: &PacketRays, (active, backward): (u32, [bool; 3])) -> Start<S, Self> {
         let together = Packet::<S>::new(packet, active, backward);
         let rays = together.slabs.clipped(&self.bounds);
         let mask = rays.open() & active;
-        let mark = Segment { near: S::range(S::F::load(&packet.t_near32), active)[0], far: S::range(S::F::load(&packet.t_cull), active)[1] };
+        let mark = Segment {
+            near: S::range(S::F::load(&packet.t_near32), active)[0],
+            far: S::range(S::F::load(&packet.t_cull), active)[1],
+        };
         let root = (mask != 0).then_some(Entry { word: Self::root(), mask, mark, rays });
         (together, root)
     }
