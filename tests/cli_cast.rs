@@ -52,7 +52,7 @@ fn hits_of_the_last_frame_are_written_and_summed_up() {
     std::fs::write(path("a.tris"), square(0.0)).expect("written");
     std::fs::write(path("b.tris"), square(1.0)).expect("written");
     std::fs::write(path("r.rays"), rays()).expect("written");
-    for (accel, packet) in [("list", false), ("bvh2", false), ("bvh2", true)] {
+    for (accel, packet) in [("list", false), ("bvh2", false), ("bvh2", true), ("bvh8", false), ("bvh8", true)] {
         let mut command = kinora();
         command.arg("cast").args([path("a.tris"), path("b.tris")]).arg("--rays").arg(path("r.rays"));
         command.arg("--hits").arg(path("h.hits")).args(["--accel", accel, "--repeat", "3", "--json", "--threads", "1"]);

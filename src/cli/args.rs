@@ -61,7 +61,7 @@ pub(crate) enum Command {
 pub(crate) struct CommonArgs {
     #[arg(long, global = true, value_name = "N", help = THREADS_HELP)]
     pub(crate) threads: Option<usize>,
-    #[arg(long, global = true, value_name = "NAME", default_value = "bvh2", value_parser = values::accel, help = accel_help())]
+    #[arg(long, global = true, value_name = "NAME", default_value = "bvh8", value_parser = values::accel, help = accel_help())]
     pub(crate) accel: AccelSpec,
     /// Structure over groups of triangles
     #[arg(long, global = true, value_name = "NAME", default_value = "bvh2", value_parser = values::top())]
