@@ -1,7 +1,8 @@
 //! A crowd and a hail of bodies: 500 skinned characters, each on its own clip and time with cross-fades, or 10,000 rigid
-//! instances of a few meshes; what each stage of a frame takes.
+//! instances of a few meshes; what each stage of a frame takes, and a picture of the last one.
 //!
-//! `cargo run --release --example crowd [FILE.glb]`: without a file the characters are those of the built-in walk.
+//! `cargo run --release --example crowd [FILE.glb] [FOLDER]`: without a file, or with `-`, the characters are those of the built-in walk;
+//! `crowd.png` and `hail.png` go into the folder.
 
 use std::{path::Path, sync::Arc, time::Duration};
 
@@ -11,8 +12,10 @@ use kinora::{
     geom::{Forms, Ray},
     glam::{DAffine3, DVec3, Vec3},
     rayon::ThreadPoolBuilder,
+    render::{CameraView, Film, RenderSettings, Renderer},
     scene::{ClipId, Scene, builtin, import},
     simd::SimdLevel,
+    world::World,
 };
 
 const CHARACTERS: usize = 500;
@@ -20,12 +23,14 @@ const BODIES: usize = 10_000;
 const FRAMES: u32 = 60;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let character = match std::env::args().nth(1) {
+    let character = match std::env::args().nth(1).filter(|file| file != "-") {
         Some(file) => import::from_path(Path::new(&file))?,
         None => builtin::load("walk")?,
     };
-    crowd(&Arc::new(character))?;
-    hail(&Arc::new(builtin::load("tumble")?))
+    let folder = std::env::args().nth(2);
+    let picture = |name: &str| folder.as_ref().map(|folder| Path::new(folder).join(name));
+    crowd(&Arc::new(character), picture("crowd.png").as_deref())?;
+    hail(&Arc::new(builtin::load("tumble")?), picture("hail.png").as_deref())
 }
 
 fn frame_loop() -> Result<FrameLoop, Box<dyn std::error::Error>> {
@@ -41,7 +46,7 @@ fn place(i: usize, count: usize, spacing: f64) -> DAffine3 {
 }
 
 /// Every character walks on its own clip and fades into another time of the next one, again and again.
-fn crowd(scene: &Arc<Scene>) -> Result<(), Box<dyn std::error::Error>> {
+fn crowd(scene: &Arc<Scene>, picture: Option<&Path>) -> Result<(), Box<dyn std::error::Error>> {
     let clips: Vec<ClipId> =
         (0..).map(ClipId).zip(&scene.clips).filter(|(_, clip)| clip.disabled.is_none()).map(|(id, _)| id).collect();
     let mut frames = frame_loop()?;
@@ -70,6 +75,7 @@ fn crowd(scene: &Arc<Scene>) -> Result<(), Box<dyn std::error::Error>> {
         if frame + 1 == FRAMES {
             println!("{CHARACTERS} characters, {} triangles, {} groups", world.triangle_count(), world.group_count());
             cast(&world)?;
+            paint(&world, picture)?;
         }
     }
     report(&times);
@@ -78,7 +84,7 @@ fn crowd(scene: &Arc<Scene>) -> Result<(), Box<dyn std::error::Error>> {
 }
 
 /// Copies of a scene of rigid bodies, out of step, as many as make [`BODIES`] instances.
-fn hail(scene: &Arc<Scene>) -> Result<(), Box<dyn std::error::Error>> {
+fn hail(scene: &Arc<Scene>, picture: Option<&Path>) -> Result<(), Box<dyn std::error::Error>> {
     let mut frames = frame_loop()?;
     let copies = BODIES.div_ceil(scene.instances.len());
     for i in 0..copies {
@@ -97,6 +103,7 @@ fn hail(scene: &Arc<Scene>) -> Result<(), Box<dyn std::error::Error>> {
             let (instances, triangles) = (world.instances().len(), world.triangle_count());
             println!("{instances} instances, {triangles} triangles, {} groups", world.group_count());
             cast(&world)?;
+            paint(&world, picture)?;
         }
     }
     report(&times);
@@ -105,7 +112,7 @@ fn hail(scene: &Arc<Scene>) -> Result<(), Box<dyn std::error::Error>> {
 }
 
 /// A picture's rays from above: how many hit.
-fn cast(world: &kinora::world::World) -> Result<(), Box<dyn std::error::Error>> {
+fn cast(world: &World) -> Result<(), Box<dyn std::error::Error>> {
     let bounds = world.bounds();
     let eye = bounds.center() + Vec3::new(0.4, 1.0, 0.6) * bounds.diagonal();
     let ray = |i: u16| {
@@ -118,6 +125,24 @@ fn cast(world: &kinora::world::World) -> Result<(), Box<dyn std::error::Error>> 
     world.hit_all(&rays, SimdLevel::best(), &mut hits)?;
     let rate = rays.len() as f64 / began.elapsed().as_secs_f64() / 1e6;
     println!("{} of {} rays hit, {rate:.2} Mrays/s by one thread", hits.iter().flatten().count(), rays.len());
+    Ok(())
+}
+
+/// The whole of a world, into a file if there is one to be.
+fn paint(world: &World, file: Option<&Path>) -> Result<(), Box<dyn std::error::Error>> {
+    let Some(file) = file else { return Ok(()) };
+    let (width, height) = (1280, 720);
+    let back = Vec3::new(0.3, 0.35, 0.8);
+    let camera = CameraView::framing_from(world.bounds(), width as f32 / height as f32, back);
+    let (mut renderer, mut film, mut rgba) = (Renderer::default(), Film::new(width, height), Vec::new());
+    let settings = RenderSettings::default();
+    // The first one prepares textures.
+    renderer.render(world, &camera, &settings, &mut film)?;
+    let began = std::time::Instant::now();
+    let rays = renderer.render(world, &camera, &settings, &mut film)?;
+    println!("{rays} rays of a picture of {width} x {height} in {:.1?}", began.elapsed());
+    film.to_srgb8(&mut rgba);
+    image::save_buffer(file, &rgba, width, height, image::ColorType::Rgba8)?;
     Ok(())
 }
 

@@ -13,7 +13,7 @@ use crate::{
         Aabb, Precision, PrimId, Triangles,
         exact::{BOUND, Quotients, TriangleHit},
     },
-    simd::{Lanes, Simd},
+    simd::{Lanes, Simd, prefetch},
 };
 
 /// Marks a lane without a triangle.
@@ -32,6 +32,16 @@ pub(super) struct TriBlock {
 }
 
 const _: () = assert!(size_of::<TriBlock>() == 160);
+
+/// The order in which a refit comes upon the blocks of a tree.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Sweep {
+    Upward,
+    Downward,
+}
+
+/// By how many blocks vertices are asked for before they are needed, corners twice and blocks four times as many.
+const AHEAD: usize = 6;
 
 /// What a refit of a block found.
 #[derive(Clone, Copy, Debug)]
@@ -118,13 +128,43 @@ impl TriBlock {
         [axis(0), axis(1), axis(2)]
     }
 
+    /// Refits one of the blocks of a tree that is swept through them in this or the other direction: memory that the next ones need is asked
+    /// for. Blocks, corners and vertices stand in three orders, so a sweep would wait for each.
+    #[inline(always)]
+    pub(super) fn refit_in_sweep(blocks: &mut [Self], at: usize, sweep: Sweep, prims: &Triangles<'_>) -> BlockBounds {
+        let ahead = |count: usize| match sweep {
+            Sweep::Upward => at + count,
+            Sweep::Downward => at.wrapping_sub(count),
+        };
+        let last = prims.indices.len().wrapping_sub(1);
+        if let Some(block) = blocks.get(ahead(AHEAD)) {
+            for &prim in &block.prims {
+                if let Some(corners) = prims.indices.get((prim as usize).min(last)) {
+                    prefetch(prims.positions, corners[0] as usize);
+                    prefetch(prims.positions, corners[1] as usize);
+                    prefetch(prims.positions, corners[2] as usize);
+                }
+            }
+        }
+        if let Some(block) = blocks.get(ahead(2 * AHEAD)) {
+            for &prim in &block.prims {
+                prefetch(prims.indices, (prim as usize).min(last));
+            }
+        }
+        if let Some(block) = blocks.get(ahead(4 * AHEAD)) {
+            prefetch(&block.prims, 0);
+        }
+        blocks[at].refit(prims)
+    }
+
     /// Takes the corners from `prims` and returns the box around them.
     #[inline(always)]
     pub(super) fn refit(&mut self, prims: &Triangles<'_>) -> BlockBounds {
         let first = self.prims[0];
         let mut vertices = [[0; 3]; 4];
         for (vertices, &prim) in vertices.iter_mut().zip(&self.prims) {
-            *vertices = prims.indices[if prim == NO_PRIM { first } else { prim } as usize];
+            // No branch: it would wait for the block's memory, and what follows with it.
+            *vertices = prims.indices[[prim, first][usize::from(prim == NO_PRIM)] as usize];
         }
         let mut rows = [[Vec4::ZERO; 3]; 3];
         let mut zero = Vec4::ZERO;

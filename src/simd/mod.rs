@@ -11,6 +11,7 @@ mod float_mode;
 mod lanes;
 mod level;
 mod ordered;
+mod prefetch;
 mod scalar;
 mod stack;
 #[cfg(target_arch = "x86_64")]
@@ -22,6 +23,7 @@ pub use float_mode::{FloatModeError, check_float_mode};
 pub use lanes::{Halves, Lanes, Simd};
 pub use level::SimdLevel;
 pub use ordered::{LEAST_KEY, key_floor};
+pub use prefetch::prefetch;
 pub use scalar::{Array, Scalar};
 pub use stack::Stack;
 

@@ -1,6 +1,9 @@
 use super::node::{Link, Pair};
 use crate::{
-    accel::{block::TriBlock, sah},
+    accel::{
+        block::{Sweep, TriBlock},
+        sah,
+    },
     geom::{Aabb, Triangles},
 };
 
@@ -108,8 +111,8 @@ fn refit_leaf(link: Link, blocks: &mut [TriBlock], first_block: usize, prims: &T
     }
     let mut aabb = Aabb::EMPTY;
     let mut own_area = 0.0;
-    for block in &mut blocks[range.start - first_block..range.end - first_block] {
-        let bounds = block.refit(prims);
+    for at in (range.start - first_block..range.end - first_block).rev() {
+        let bounds = TriBlock::refit_in_sweep(blocks, at, Sweep::Downward, prims);
         aabb = aabb.union(bounds.aabb);
         own_area += bounds.own_area;
     }

@@ -11,7 +11,10 @@ use super::{
     node::{Pair, Word},
 };
 use crate::{
-    accel::{block::TriBlock, sah},
+    accel::{
+        block::{Sweep, TriBlock},
+        sah,
+    },
     geom::{Aabb, PrimId, Triangles},
 };
 
@@ -71,8 +74,9 @@ impl Leaves for Blocks<'_> {
     fn refit(&mut self, place: usize, prims: &Triangles<'_>) -> Swept {
         let span = self.spans.get(place).map_or(1, |&span| usize::from(span));
         let mut swept = Swept::EMPTY;
-        for block in &mut self.own[place - self.first..][..span] {
-            let bounds = block.refit(prims);
+        let first = place - self.first;
+        for at in first..first + span {
+            let bounds = TriBlock::refit_in_sweep(self.own, at, Sweep::Upward, prims);
             swept = swept.plus(Swept { aabb: bounds.aabb, own_area: bounds.own_area });
         }
         swept

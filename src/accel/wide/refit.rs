@@ -2,7 +2,10 @@
 
 use super::{Place, WIDTH, WideNode};
 use crate::{
-    accel::{block::TriBlock, sah},
+    accel::{
+        block::{Sweep, TriBlock},
+        sah,
+    },
     geom::{Aabb, Triangles},
 };
 
@@ -113,8 +116,9 @@ impl<N: WideNode, B: Store<N>, R: Fn(N::Word) -> usize + Copy + Send + Sync> Sub
             return swept;
         }
         let span = (self.span)(word);
-        for block in &mut self.blocks[word.index() - self.first_block..][..span] {
-            let bounds = block.refit(prims);
+        let first = word.index() - self.first_block;
+        for at in first..first + span {
+            let bounds = TriBlock::refit_in_sweep(self.blocks, at, Sweep::Upward, prims);
             swept = swept.plus(Swept { aabb: bounds.aabb, cost: 0.0, own_area: bounds.own_area });
         }
         swept.cost = sah::half_area(swept.aabb) * sah::COST_BLOCK * span as f64;
