@@ -6,10 +6,13 @@ use std::{error::Error, sync::Arc};
 
 use kinora::{
     anim::{ActiveClip, loop_time},
-    collide::{CollisionConfig, CollisionWorld, ContactLevel, ContactOptions, ContactPhase, ContactTracker, PartId},
+    collide::{CollisionConfig, CollisionWorld, ContactLevel, ContactOptions, ContactPhase, ContactTracker, Layers},
     glam::{DAffine3, DVec3},
     scene::{ClipId, builtin},
 };
+
+/// Layer of the characters; the stages that they walk on stay on the first one.
+const CHARACTERS: u32 = 0b10;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let scene = Arc::new(builtin::load("walk")?);
@@ -20,6 +23,11 @@ fn main() -> Result<(), Box<dyn Error>> {
         world.add_scene(scene.clone(), DAffine3::IDENTITY)?,
         world.add_scene(scene, DAffine3::from_translation(DVec3::X))?,
     ];
+    let rest = world.snapshot()?;
+    for part in rest.parts().filter(|part| part.path() == "figure") {
+        world.set_layers(part.id(), Layers { on: CHARACTERS, sees: CHARACTERS })?;
+    }
+    let options = ContactOptions { layers: CHARACTERS, ..ContactOptions::default() };
     let mut tracker = ContactTracker::new(ContactLevel::Part);
     for frame in 0..24_u32 {
         let seconds = f64::from(frame) / 12.0;
@@ -31,9 +39,6 @@ fn main() -> Result<(), Box<dyn Error>> {
         let place = DVec3::X * (1.2 - 1.2 * seconds);
         world.set_transform(figures[1], DAffine3::from_translation(place))?;
         let snapshot = world.snapshot()?;
-        let object = |part: PartId| snapshot.part(part).map(|p| p.object()).ok();
-        let of_two = |a: PartId, b: PartId| object(a) != object(b);
-        let options = ContactOptions { accept: Some(&of_two), ..ContactOptions::default() };
         for event in tracker.update(&snapshot.contacts(&options)?) {
             if event.phase == ContactPhase::Persist {
                 continue;

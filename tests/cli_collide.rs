@@ -83,6 +83,7 @@ fn continuous_adds_times_within_the_step() {
 fn wrong_input_ends_in_2_with_a_reason() {
     assert!(error(&["none.glb"]).contains("none.glb"));
     assert!(error(&["--pairs", "figure,no such node"]).contains("no such node"));
+    assert!(error(&["--pairs", "no such node,figure"]).contains("there are `"), "names that would do");
     assert!(error(&["--pairs", "figure"]).contains("--pairs"));
     assert!(error(&["--level", "vertex"]).contains("vertex"));
     assert!(error(&["--continuous", "--tolerance=-1"]).contains("--tolerance"));

@@ -54,10 +54,10 @@ pub(crate) struct CollideArgs {
     /// Also contacts between frames, vertices moving along straight lines: none is missed, and `toi_s` is never late
     #[arg(long)]
     continuous: bool,
-    /// How much nearer than it may be, in the scene's units, counts as touching between frames
+    /// How far apart beyond --min-separation, in the scene's units, may still be reported as touching between frames: what it takes to miss nothing
     #[arg(long, value_name = "LENGTH", default_value_t = Continuous::default().tolerance, requires = "continuous")]
     tolerance: f64,
-    /// Distance up to which things count as touching between frames
+    /// Distance, in the scene's units, up to which things count as touching between frames
     #[arg(long, value_name = "LENGTH", default_value_t = 0.0, requires = "continuous")]
     min_separation: f64,
 }

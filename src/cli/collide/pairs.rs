@@ -39,9 +39,30 @@ fn find(text: &str, scene: &Scene) -> Result<[HashSet<NodeId>; 2], CliError> {
         }
     }
     Err(CliError::usage(match unknown {
-        Some(name) => format!("{}: --pairs {text}: there is no node `{name}`", scene.file),
+        Some(name) => format!("{}: --pairs {text}: there is no node `{name}`; {}", scene.file, known(scene)),
         None => format!("--pairs {text}: expected the names of two nodes with a comma between them"),
     }))
+}
+
+/// Names of nodes with triangles, the first of many.
+fn known(scene: &Scene) -> String {
+    const SHOWN: usize = 12;
+    let mut names: Vec<&str> = Vec::new();
+    for node in scene.instances.iter().map(|instance| scene.nodes[instance.node.index()].name.as_str()) {
+        if !node.is_empty() && !names.contains(&node) {
+            names.push(node);
+            if names.len() > SHOWN {
+                break;
+            }
+        }
+    }
+    let more = if names.len() > SHOWN { ", ..." } else { "" };
+    let quoted: Vec<_> = names.iter().take(SHOWN).map(|name| format!("`{name}`")).collect();
+    if quoted.is_empty() {
+        "no node with triangles has a name".to_owned()
+    } else {
+        format!("there are {}{more}", quoted.join(", "))
+    }
 }
 
 /// The nodes with a name and all below them.
