@@ -171,6 +171,35 @@ proptest! {
     }
 
     #[test]
+    fn batches_answer_as_single_rays(
+        a in soup(60), rays in vec((point(20), point(4), 0_u8..5), 1..70), away: bool, on in 1_u32..4, layers in 1_u32..4,
+    ) {
+        let mut world = empty();
+        add(&mut world, &a);
+        if away {
+            // A part on another layer.
+            add(&mut world, &a);
+            world.set_layers(PartId(1), Layers { on: 0b100, ..Layers::default() }).unwrap();
+        }
+        world.set_layers(PartId(0), Layers { on, ..Layers::default() }).unwrap();
+        let snapshot = world.snapshot().unwrap();
+        let ray = |&(origin, dir, far): &(Vec3, Vec3, u8)| {
+            let t_far = if far == 0 { f32::INFINITY } else { f32::from(far) };
+            Ray { t_far, ..Ray::new(origin, dir) }
+        };
+        let rays: Vec<Ray> = rays.iter().map(ray).collect();
+        for layers in [layers, Layers::ALL] {
+            let (mut hits, mut blocked) = (vec![None; rays.len()], vec![false; rays.len()]);
+            snapshot.closest_hits(&rays, layers, &mut hits).unwrap();
+            snapshot.any_hits(&rays, layers, &mut blocked).unwrap();
+            for ((ray, hit), blocked) in rays.iter().zip(&hits).zip(&blocked) {
+                let due = snapshot.closest_hit(ray, layers).unwrap().map(|h| h.hit);
+                prop_assert_eq!((*hit, *blocked), (due, due.is_some()), "{:?}", ray);
+            }
+        }
+    }
+
+    #[test]
     fn overlaps_are_those_of_every_triangle_asked(
         a in soup(60), b in soup(40), min in point(12), size in point(12), other in [point(12), point(12), point(12)], radius in 0_u8..12,
     ) {

@@ -45,7 +45,7 @@ impl Snapshot {
         Ok(self.answer(&best))
     }
 
-    /// As [`Snapshot::closest_point`], on one part.
+    /// As [`Snapshot::closest_point`], on one part, whatever its layers.
     ///
     /// # Errors
     /// As there, and when there is no such part.
@@ -63,7 +63,8 @@ impl Snapshot {
 
     /// Where two parts come nearest to each other, at most `within`; of equally near pairs of triangles the lowest.
     ///
-    /// Accuracy: as [`super::triangle_distance`].
+    /// Accuracy: as [`super::triangle_distance`]. Cost: some 0.3 µs for each pair of triangles whose boxes are nearer than the answer, so least where the parts
+    /// meet or `within` is small. Layers are not looked at. One thread.
     ///
     /// # Errors
     /// When there is no such part, `within` is NaN or negative, or foreign code changed how this thread computes.

@@ -30,7 +30,7 @@ impl Snapshot {
     /// The distance from a point to a closed part, negative inside: where the surface winds around the point, however often and in
     /// whichever sense, so that surfaces that cut through themselves have an inside too.
     ///
-    /// The sign is exact; the distance is that of [`Snapshot::closest_point_on`].
+    /// The sign is exact; the distance is that of [`Snapshot::closest_point_on`]. Cost: as [`Snapshot::winding_number`] and that together.
     ///
     /// # Errors
     /// [`CollideError::NotClosed`] where an edge of the part (vertices at one place of the rest pose are one) is not run along once in each
@@ -46,6 +46,8 @@ impl Snapshot {
     ///
     /// Counts, with their signs, the triangles that a ray along +x crosses, from a point moved by less than any number, so that rays along
     /// edges and through corners are no exception.
+    ///
+    /// Cost: a walk along that ray, a microsecond or less; whether the part is closed is found out once, in the first call for a part, some 100 ns a triangle.
     ///
     /// # Errors
     /// As [`Snapshot::signed_distance`].

@@ -107,7 +107,7 @@ impl Snapshot {
 
 impl Snapshot {
     /// When two triangles first come within `settings.min_separation` of each other on the way to `next`, by all of their features but those
-    /// with a vertex in common; at the start for triangles that already meet. `None` only if they surely do not.
+    /// with a vertex in common; at the start for triangles that already meet. `None` only if they surely do not. Cost: some microseconds.
     ///
     /// # Errors
     /// As [`Snapshot::moving_contacts`], and when there is no such part or triangle.

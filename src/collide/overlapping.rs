@@ -52,6 +52,9 @@ pub struct Overlap {
 impl Snapshot {
     /// Every triangle on one of `layers` that shares a point with `shape`, in ascending order of part and triangle.
     ///
+    /// Cost: a walk, some 50 ns for each triangle whose box meets that of the shape (for a hull, for each of its faces), and 100 ns for each one found.
+    /// For [`Shape::Part`] as [`Snapshot::pairs_between`]. One thread; allocates.
+    ///
     /// # Errors
     /// When the shape has NaN or (but for boxes) an infinite number, an empty box, a negative radius or no such part, or foreign code
     /// changed how this thread computes.
@@ -65,6 +68,8 @@ impl Snapshot {
     }
 
     /// The first of [`Snapshot::overlaps`].
+    ///
+    /// Cost: as there, for the parts up to that of the first one.
     ///
     /// # Errors
     /// As there.
@@ -113,6 +118,8 @@ impl Snapshot {
     }
 
     /// Whether any triangle on one of `layers` shares a point with `shape`.
+    ///
+    /// Cost: as [`Snapshot::overlaps`], up to the first one found.
     ///
     /// # Errors
     /// As [`Snapshot::overlaps`].

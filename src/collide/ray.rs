@@ -7,10 +7,10 @@ use rayon::prelude::*;
 
 use super::{CollideError, Layers, PartId, Side, Snapshot, Surface, world::PartFrame};
 use crate::{
-    accel::TravRay,
+    accel::{PACKET, TravRay},
     geom::{Hit, InstanceId, PrimId, Ray, exact::TriangleHit},
     simd::{Simd, SimdLevel, Task, check_float_mode, dispatch},
-    world::World,
+    world::{GroupFrame, World},
 };
 
 /// Where a ray meets a part.
@@ -115,15 +115,23 @@ impl Snapshot {
 
     /// The nearest hit of every ray, in order, into `out`: what [`Snapshot::closest_hit`] finds, [`Snapshot::named`] on demand.
     ///
-    /// In parallel in the current rayon pool; pays most where consecutive rays run close together.
+    /// In parallel in the current rayon pool; pays most where consecutive rays run close together, and where there is one part only, whose structure then
+    /// answers a batch as a whole.
     ///
     /// # Errors
     /// As [`Snapshot::closest_hit`], and when `out` and `rays` differ in length.
     pub fn closest_hits(&self, rays: &[Ray], layers: u32, out: &mut [Option<Hit>]) -> Result<(), CollideError> {
         same_length(rays.len(), out.len())?;
         let world = self.world()?;
+        let (only, unfiltered) = (only_group(world), self.are_all_on(layers));
         let one = |(rays, out): (&[Ray], &mut [Option<Hit>])| -> Result<(), CollideError> {
-            if layers == Layers::ALL {
+            if let (Some((group, instance)), true) = (only, unfiltered) {
+                let prims = group.triangles();
+                group.accel.closest_hits_as(&prims, rays, PACKET, SimdLevel::best(), world.forms, out)?;
+                out.iter_mut().flatten().for_each(|hit| hit.instance = instance);
+                return Ok(());
+            }
+            if unfiltered {
                 return Ok(world.hit_all(rays, SimdLevel::best(), out)?);
             }
             check_float_mode()?;
@@ -144,8 +152,13 @@ impl Snapshot {
     pub fn any_hits(&self, rays: &[Ray], layers: u32, out: &mut [bool]) -> Result<(), CollideError> {
         same_length(rays.len(), out.len())?;
         let world = self.world()?;
+        let (only, unfiltered) = (only_group(world), self.are_all_on(layers));
         let one = |(rays, out): (&[Ray], &mut [bool])| -> Result<(), CollideError> {
-            if layers == Layers::ALL {
+            if let (Some((group, _)), true) = (only, unfiltered) {
+                let prims = group.triangles();
+                return Ok(group.accel.blocked_as(&prims, rays, PACKET, SimdLevel::best(), world.forms, out)?);
+            }
+            if unfiltered {
                 return Ok(world.block_all(rays, SimdLevel::best(), out)?);
             }
             check_float_mode()?;
@@ -179,6 +192,10 @@ impl Snapshot {
         self.rays()
     }
 
+    fn are_all_on(&self, layers: u32) -> bool {
+        layers == Layers::ALL || self.frames().iter().all(|part| part.len() == 0 || part.layers.on & layers != 0)
+    }
+
     fn is_on(&self, hit: &Hit, layers: u32) -> bool {
         self.frames()[hit.instance.0 as usize].layers.on & layers != 0
     }
@@ -189,6 +206,14 @@ impl Snapshot {
         let surface = self.surface_at(frame, PartId(hit.instance.0), hit.prim.0, u, v);
         let dir: DVec3 = ray.dir.as_dvec3();
         RayHit { hit, side: surface.side_seen_along(dir), surface }
+    }
+}
+
+/// The group of a world that has one only, of one part: its structure then answers whole batches.
+fn only_group(world: &World) -> Option<(&GroupFrame, InstanceId)> {
+    match (&world.groups[..], world.groups.first().map(|group| &group.layout.instances[..])) {
+        ([group], Some(&[instance])) if group.rigid.is_none() => Some((group, instance)),
+        _ => None,
     }
 }
 

@@ -41,6 +41,8 @@ pub(super) struct Lists {
     volumes: Vec<Aabb>,
     /// Over the volumes.
     tree: Tree,
+    /// Pairs of volumes that meet.
+    couples: Vec<[u32; 2]>,
     axis: usize,
 }
 
@@ -94,20 +96,19 @@ impl Lists {
     }
 
     /// Every pair of boxes that meet, each once.
-    pub(super) fn pairs<V: PairVisitor>(&self, visitor: &mut V) {
-        let mut volumes = Vec::new();
+    pub(super) fn pairs<V: PairVisitor>(&mut self, visitor: &mut V) {
+        let couples = &mut self.couples;
+        couples.clear();
         self.tree.own_pairs(&mut |a: u32, b: u32| {
-            volumes.push([a, b]);
+            couples.push([a, b]);
             ControlFlow::Continue(())
         });
-        dispatch(SimdLevel::best(), Sweep { lists: self, volumes: &volumes, visitor });
+        dispatch(SimdLevel::best(), Sweep { lists: self, visitor });
     }
 }
 
 struct Sweep<'a, V> {
     lists: &'a Lists,
-    /// Pairs of volumes that meet.
-    volumes: &'a [[u32; 2]],
     visitor: &'a mut V,
 }
 
@@ -116,11 +117,11 @@ impl<V: PairVisitor> Task for Sweep<'_, V> {
 
     #[inline(always)]
     fn run<S: Simd>(self) {
-        let Self { lists, volumes, visitor } = self;
+        let Self { lists, visitor } = self;
         for volume in 0..lists.volumes.len() {
             lists.sweep_one::<S, V>(volume, visitor);
         }
-        for &[a, b] in volumes {
+        for &[a, b] in &lists.couples {
             lists.sweep_two::<S, V>(a as usize, b as usize, visitor);
         }
     }

@@ -52,7 +52,8 @@ impl BroadMethod {
 
 /// Finds the pairs of boxes that meet, frame after frame.
 ///
-/// Which way is taken depends on measured times, what is found does not.
+/// Which way is taken depends on measured times, what is found does not: another machine or run may take other ways and finds the same pairs. A way
+/// that was dearer when last tried is tried again when a fiftieth of the time since then pays for it.
 #[derive(Debug, Default)]
 pub struct BroadPhase {
     /// Of the last frame.
@@ -97,7 +98,10 @@ const STRAYS: usize = 64;
 impl BroadPhase {
     /// Takes the boxes of the next frame: the pairs `[i, j]`, `i < j`, of closed ones that share a point, ascending.
     ///
-    /// Empty boxes and those with NaN meet nothing; infinite ends are legal. Their number may change. In steady state nothing is allocated.
+    /// Empty boxes and those with NaN meet nothing; infinite ends are legal. Their number may change, which makes everything anew. In steady state
+    /// nothing is allocated.
+    ///
+    /// Cost: for boxes about as large as their distances, some 25 ns a box in frames that keep pairs, 150 to 250 ns where all moved far. One thread.
     ///
     /// # Panics
     /// With more than 2^30 boxes.

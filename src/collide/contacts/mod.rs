@@ -104,6 +104,8 @@ impl Snapshot {
     /// All pairs of triangles of two parts that share a point, in ascending order, whatever their layers; `a` and `b` the same for
     /// those within one part, without neighbours.
     ///
+    /// Cost: as [`Snapshot::contact_pairs`].
+    ///
     /// # Errors
     /// When there is no such part, or foreign code changed how this thread computes.
     pub fn pairs_between(&self, a: PartId, b: PartId) -> Result<Vec<TrianglePair>, CollideError> {
@@ -114,7 +116,7 @@ impl Snapshot {
         Ok(if a == b { self.within(a, false) } else { self.between(a, b) })
     }
 
-    /// How two triangles meet; `None` when they do not.
+    /// How two triangles meet; `None` when they do not. Cost: some 0.5 µs. No allocation.
     ///
     /// # Errors
     /// When there is no such part or triangle.
