@@ -142,7 +142,9 @@ impl Object {
         if actual != expected {
             return Err(CollideError::Count { what: "vertices", actual, expected });
         }
-        if !vertices.iter().all(|v| v.is_finite()) {
+        // 0 for numbers, NaN for all else.
+        let nothing = vertices.iter().fold(Vec3::ZERO, |sum, v| sum + (*v - *v));
+        if nothing != Vec3::ZERO {
             return Err(CollideError::NotFinite { what: "vertices" });
         }
         own.copy_from_slice(vertices);
