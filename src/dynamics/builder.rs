@@ -27,6 +27,8 @@ pub(super) struct Job {
     pub(super) ahead: f32,
     /// The frame that the snapshot is of.
     pub(super) frame: u64,
+    /// The tree is to be swapped in only if it is no worse than the one in use.
+    pub(super) on_trial: bool,
     /// Panic instead of building.
     #[cfg(test)]
     pub(super) panic: bool,
@@ -48,6 +50,8 @@ pub(super) struct Built {
     pub(super) positions: Option<Arc<Vec<Vec3>>>,
     /// The frame that they are of.
     pub(super) frame: u64,
+    /// As the job's, of trees that are ahead.
+    pub(super) on_trial: bool,
 }
 
 /// Why a job gave no tree.
@@ -89,7 +93,12 @@ fn run(pool: &rayon::ThreadPool, spec: &AccelSpec, job: Job, expected: &mut Vec<
         pool.install(|| spec.build(&job.layout.triangles(positions)))
     };
     let result = match catch_unwind(AssertUnwindSafe(build)) {
-        Ok(Ok(accel)) => Ok(Built { accel, positions: before.is_none().then_some(job.positions), frame: job.frame }),
+        Ok(Ok(accel)) => Ok(Built {
+            accel,
+            on_trial: job.on_trial && before.is_some(),
+            positions: before.is_none().then_some(job.positions),
+            frame: job.frame,
+        }),
         Ok(Err(error)) => Err(Failure::Build(error)),
         Err(panic) => Err(Failure::Panicked(message(panic.as_ref()))),
     };

@@ -87,7 +87,8 @@ pub struct LoopCounts {
     pub tops: u64,
     /// Those of them that sorted event lists: none unless the level over groups is `events`.
     pub event_sorts: u64,
-    /// Rebuilt trees dropped because the triangles they were built over are gone.
+    /// Rebuilt trees dropped because the triangles they were built over are gone, or because they were built for a motion that did not come and were worse
+    /// than the tree in use.
     pub rebuilds_dropped: u64,
     /// Worst quality seen, at least 1: surface-area cost over that of the last fresh build of the same
     /// triangles, both relative to the area of the triangles' own boxes.

@@ -204,6 +204,7 @@ impl FrameLoop {
         self.counts.moves += work.moves;
         self.counts.builds += work.builds;
         self.counts.swaps += work.swaps;
+        self.counts.rebuilds_dropped += work.dropped;
         let quality = self.stage.quality();
         self.counts.quality_max = self.counts.quality_max.max(quality);
         let mut world = self.worlds.take(World::default);

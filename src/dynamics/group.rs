@@ -84,6 +84,8 @@ pub(super) struct Work {
     pub(super) moves: u64,
     pub(super) builds: u64,
     pub(super) swaps: u64,
+    /// Rebuilds that were worse than the tree in use.
+    pub(super) dropped: u64,
 }
 
 impl Group {
@@ -210,18 +212,35 @@ impl Group {
         Ok(Work { swaps, ..work })
     }
 
+    /// Takes a finished rebuild, unless it was made for a motion that did not come and the tree in use is the better one.
     fn swap(&mut self, built: Built, spec: &AccelSpec, frame: u64) -> Result<Work, FrameError> {
         let base = Arc::new(built.accel);
-        self.built_of = built.frame;
-        self.lag = frame.saturating_sub(built.frame);
-        self.phase = None;
+        let lag = frame.saturating_sub(built.frame);
         let work = if built.positions.is_some_and(|positions| Arc::ptr_eq(&positions, &self.positions)) {
             self.moved_since_build = false;
             self.accel = Some(base.clone());
             Work::default()
         } else {
-            self.refit(&base, spec, frame)?
+            let current = self.accel.take();
+            let mut work = self.refit(&base, spec, frame)?;
+            if let Some(current) = current.filter(|_| built.on_trial && work.builds == 0) {
+                let swapped = self.accel.take();
+                let again = self.refit(&current, spec, frame)?;
+                work.refits += again.refits;
+                work.leaf_refits += again.leaf_refits;
+                let cost = |accel: &Option<Arc<AnyAccel>>| accel.as_ref().map_or(f64::INFINITY, |a| a.stats().sah_cost);
+                if cost(&self.accel) < cost(&swapped) {
+                    // The next one is built for where vertices are.
+                    self.lag = 0;
+                    return Ok(Work { dropped: 1, ..work });
+                }
+                self.accel = swapped;
+            }
+            work
         };
+        self.built_of = built.frame;
+        self.lag = lag;
+        self.phase = None;
         if base.refits() {
             self.accel_pool.keep(base);
         }
@@ -321,6 +340,7 @@ impl Group {
             before: self.before.take(),
             ahead: 1.5 * lag.unwrap_or(self.lag).min(1000) as f32,
             frame,
+            on_trial: lag.is_none(),
             #[cfg(test)]
             panic: false,
         }

@@ -246,6 +246,7 @@ impl Stage {
             sum.moves += work.moves;
             sum.builds += work.builds;
             sum.swaps += work.swaps;
+            sum.dropped += work.dropped;
         }
         if self.groups.iter().any(Group::deformed) || sum.swaps + sum.builds > 0 {
             self.boxes_version += 1;
