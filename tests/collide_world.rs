@@ -424,6 +424,22 @@ fn layers_say_what_is_hit_and_what_touches() {
     );
     let near = |layers| snapshot.closest_point(Vec3::NEG_ONE, 100.0, layers).unwrap().map(|c| c.surface.part.0);
     assert_eq!([near(1), near(0b100), near(0)], [Some(1), Some(2), None]);
+    // On no layer nothing is found, by whichever question.
+    for part in 0..3 {
+        world.set_layers(PartId(part), Layers { on: 0, sees: u32::MAX }).unwrap();
+    }
+    let hidden = world.snapshot().unwrap();
+    let (mut hits, mut blocked) = ([None; 1], [false; 1]);
+    hidden.closest_hits(&[ray], Layers::ALL, &mut hits).unwrap();
+    hidden.any_hits(&[ray], Layers::ALL, &mut blocked).unwrap();
+    assert_eq!((hits, blocked), ([None; 1], [false; 1]));
+    assert!(hidden.closest_hit(&ray, Layers::ALL).unwrap().is_none() && !hidden.any_hit(&ray, Layers::ALL).unwrap());
+    assert!(hidden.all_hits(&ray, Layers::ALL).unwrap().is_empty());
+    assert!(hidden.closest_point(Vec3::NEG_ONE, 100.0, Layers::ALL).unwrap().is_none());
+    assert!(hidden.overlaps(&Shape::Box(unit), Layers::ALL).unwrap().is_empty());
+    let boxed = Mover::Box(Aabb { min: Vec3::splat(-2.0), max: Vec3::NEG_ONE });
+    assert!(hidden.sweep(&boxed, Vec3::splat(4.0), Layers::ALL).unwrap().is_none());
+    assert!(parts(&hidden).is_empty());
 }
 
 #[test]

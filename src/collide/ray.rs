@@ -35,7 +35,7 @@ impl Snapshot {
     /// # Errors
     /// When foreign code changed how this thread computes, or the structure cannot be built (at the first ray only).
     pub fn closest_hit(&self, ray: &Ray, layers: u32) -> Result<Option<RayHit>, CollideError> {
-        if layers == Layers::ALL {
+        if layers == Layers::ALL && !self.hides_parts() {
             let world = self.world()?;
             let hit = dispatch(SimdLevel::best(), Closest { world, ray, filter: None::<&fn(&Hit) -> bool> });
             return Ok(hit.map(|hit| self.found(ray, hit)));
@@ -65,7 +65,7 @@ impl Snapshot {
     /// # Errors
     /// As [`Snapshot::closest_hit`].
     pub fn any_hit(&self, ray: &Ray, layers: u32) -> Result<bool, CollideError> {
-        if layers == Layers::ALL {
+        if layers == Layers::ALL && !self.hides_parts() {
             let task = Any { world: self.world()?, ray, filter: None::<&fn(&Hit) -> bool> };
             return Ok(dispatch(SimdLevel::best(), task));
         }
@@ -193,7 +193,7 @@ impl Snapshot {
     }
 
     fn are_all_on(&self, layers: u32) -> bool {
-        layers == Layers::ALL || self.frames().iter().all(|part| part.len() == 0 || part.layers.on & layers != 0)
+        self.frames().iter().all(|part| part.len() == 0 || part.layers.on & layers != 0)
     }
 
     fn is_on(&self, hit: &Hit, layers: u32) -> bool {

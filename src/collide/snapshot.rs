@@ -43,6 +43,8 @@ pub struct Snapshot {
 
 struct Inner {
     frame: Frame,
+    /// Whether a part is on no layer, so that no query finds it.
+    hides_parts: bool,
     /// Over the boxes of the parts.
     tree: OnceLock<Tree>,
     rays: OnceLock<World>,
@@ -63,7 +65,8 @@ impl fmt::Debug for Snapshot {
 
 impl Snapshot {
     pub(super) fn new(frame: Frame, broad: Option<&mut BroadPhase>, rays: bool) -> Result<Self, CollideError> {
-        let inner = Inner { frame, tree: OnceLock::new(), rays: OnceLock::new(), pairs: OnceLock::new() };
+        let hides_parts = frame.parts.iter().any(|part| part.len() > 0 && part.layers.on == 0);
+        let inner = Inner { frame, hides_parts, tree: OnceLock::new(), rays: OnceLock::new(), pairs: OnceLock::new() };
         let snapshot = Self { inner: Arc::new(inner) };
         if let Some(broad) = broad {
             let boxes: Vec<Aabb> = snapshot.frames().iter().map(|p| p.bounds).collect();
@@ -103,6 +106,10 @@ impl Snapshot {
     /// The least box around all triangles.
     pub fn bounds(&self) -> Aabb {
         self.frames().iter().fold(Aabb::EMPTY, |all, part| all.union(part.bounds))
+    }
+
+    pub(super) fn hides_parts(&self) -> bool {
+        self.inner.hides_parts
     }
 
     pub(super) fn frames(&self) -> &[Arc<PartFrame>] {

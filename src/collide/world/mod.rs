@@ -52,7 +52,7 @@ impl PartId {
 /// Which layers a part is on, and which it touches.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Layers {
-    /// Layers that the part is on, a bit each; a query finds it when it asks for one of them.
+    /// Layers that the part is on, a bit each; a query finds it when it asks for one of them, and never on none.
     pub on: u32,
     /// Layers of other parts that it can touch.
     pub sees: u32,

@@ -28,6 +28,12 @@ fn all(snapshot: &Snapshot, layers: u32) -> Vec<Named> {
     all
 }
 
+/// Every triangle of a part, whatever its layers.
+fn of_part(snapshot: &Snapshot, id: PartId) -> impl Iterator<Item = Named> + '_ {
+    let part = snapshot.part(id).expect("a part");
+    (0..).zip(part.triangles()).map(move |(i, corners)| (id, i, corners.map(|c| part.vertices()[c as usize])))
+}
+
 fn transform(bytes: &mut Bytes<'_>) -> DAffine3 {
     let kind = bytes.byte();
     let by = bytes.vec3().as_dvec3();
@@ -176,7 +182,7 @@ fn distances(snapshot: &Snapshot, bytes: &mut Bytes<'_>, layers: u32) {
         for other in snapshot.parts() {
             let parts = [part.id(), other.id()];
             let found = snapshot.distance_between(parts[0], parts[1], f64::INFINITY).expect("parts that are there");
-            let of = |id: PartId| all(snapshot, Layers::ALL).into_iter().filter(move |t| t.0 == id);
+            let of = |id: PartId| of_part(snapshot, id);
             let pairs = of(parts[0]).flat_map(|(_, x, s)| of(parts[1]).map(move |(_, y, t)| (x, y, s, t)));
             let near =
                 |(x, y, s, t): (u32, u32, [Vec3; 3], [Vec3; 3])| triangle_distance(&s, &t).map(|n| (n.distance, x, y));
