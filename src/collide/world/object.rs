@@ -143,7 +143,7 @@ impl Object {
             return Err(CollideError::Count { what: "vertices", actual, expected });
         }
         // 0 for numbers, NaN for all else.
-        let nothing = vertices.iter().fold(Vec3::ZERO, |sum, v| sum + (*v - *v));
+        let nothing = vertices.iter().fold(Vec3::ZERO, |sum, v| sum + *v * 0.0);
         if nothing != Vec3::ZERO {
             return Err(CollideError::NotFinite { what: "vertices" });
         }
