@@ -193,6 +193,66 @@ proptest! {
     }
 }
 
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 1500, failure_persistence: None, ..ProptestConfig::default() })]
+
+    /// Rays at edges and corners, at sheets a few numbers apart and at triangles that are there twice: what f32 cannot tell.
+    #[test]
+    fn doubtful_rays_of_packets_find_what_each_finds_alone(
+        corners in prop::collection::vec(prop::array::uniform3(prop::array::uniform3(-1.0_f32..1.0)), 2..24),
+        copies in prop::collection::vec((0_usize..24, -3_i8..4), 0..24),
+        rays in prop::collection::vec((0_usize..48, 0_usize..3, prop_oneof![Just(0.0_f32), Just(0.5), Just(1.0), 0.0_f32..1.0], 0.95_f32..1.05), 16..33),
+        spread in prop_oneof![Just(0.0_f32), Just(0.01)],
+        ends in prop::option::of((0_usize..33, prop::bool::ANY)),
+    ) {
+        let mut triangles: Vec<[Vec3; 3]> =
+            corners.iter().map(|t| t.map(|[x, y, z]| Vec3::new(0.3 * x, 0.3 * y, 3.0 + 0.3 * z))).collect();
+        for &(of, steps) in &copies {
+            let beside = |mut p: Vec3| {
+                (0..steps.abs()).for_each(|_| p.z = if steps > 0 { p.z.next_up() } else { p.z.next_down() });
+                p
+            };
+            triangles.push(triangles[of % triangles.len()].map(beside));
+        }
+        let positions: Vec<_> = triangles.iter().flatten().copied().collect();
+        let indices: Vec<_> = (0..).step_by(3).take(triangles.len()).map(|i| [i, i + 1, i + 2]).collect();
+        let prims = Triangles { positions: &positions, indices: &indices, topology_epoch: 0 };
+        let tree = Bvh8::build(&prims, &Bvh8Config::default()).unwrap();
+        let alone = |ray: &Ray, level| {
+            let ray = TravRay::new(ray);
+            ray.map_or((None, false), |ray| dispatch(level, Alone { tree: &tree, prims: &prims, ray: &ray }))
+        };
+        let mut rays: Vec<_> = rays
+            .iter()
+            .map(|&(of, side, part, length)| {
+                let triangle = triangles[of % triangles.len()];
+                let (a, b, c) = (triangle[side], triangle[(side + 1) % 3], triangle[(side + 2) % 3]);
+                // A third of the rays go through the inside.
+                let b = if of % 3 == 0 { b * 0.7 + c * 0.3 } else { b };
+                let origin = Vec3::new(-1.5, -1.5, 0.0) + Vec3::splat(spread) * length;
+                Ray::new(origin, (a * part + b * (1.0 - part) - origin) * length)
+            })
+            .collect();
+        // Ranges that begin or end at a hit.
+        if let Some((number, is_far)) = ends
+            && let (Some(hit), _) = alone(&rays[number % rays.len()], SimdLevel::best())
+        {
+            for ray in &mut rays {
+                (ray.t_near, ray.t_far) = if is_far { (0.0, hit.t) } else { (hit.t, f32::INFINITY) };
+            }
+        }
+        for level in SimdLevel::available() {
+            let expected: Vec<_> = rays.iter().map(|ray| alone(ray, level)).collect();
+            for packet in [1, PACKET] {
+                let (hits, blocked) = dispatch(level, Batch { tree: &tree, prims: &prims, rays: &rays, packet });
+                for (i, ray) in rays.iter().enumerate() {
+                    prop_assert_eq!((hits[i], blocked[i]), expected[i], "{} {} {:?}", level, packet, ray);
+                }
+            }
+        }
+    }
+}
+
 #[test]
 fn nodes_are_few_and_mostly_full() {
     let corner = |i: u16| Vec3::new(f32::from(i % 40), f32::from(i / 40), f32::from(i % 7) * 0.1);

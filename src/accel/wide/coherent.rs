@@ -14,6 +14,19 @@ use crate::{
     simd::{Lanes, Simd},
 };
 
+/// Packets that are not looked at after one whose rays point apart, because theirs most likely do as well.
+const UNSEEN: usize = 7;
+
+/// Where to go on from `at` in a packet that ends at `end`: the same of the packet that is looked at next.
+#[inline(always)]
+fn ahead(at: usize, end: usize, width: usize, len: usize) -> (usize, usize) {
+    if at < end {
+        return (at, end);
+    }
+    let next = len.min(end + UNSEEN * width);
+    (next, next)
+}
+
 /// As [`Accel::closest_all`](crate::accel::Accel::closest_all), each `width` rays together; `apart` answers runs of those that point apart.
 #[inline(always)]
 pub(in crate::accel) fn closest<S: Simd, T: PacketTree>(
@@ -38,6 +51,7 @@ pub(in crate::accel) fn closest<S: Simd, T: PacketTree>(
         at = next;
         let left = lines.load::<S>(packet, tree.reach(), forms);
         if left == 0 || lines.points_apart::<S>(left) {
+            (at, end) = ahead(at, end, width, rays.len());
             continue;
         }
         if waiting < first {
@@ -81,6 +95,7 @@ pub(in crate::accel) fn occluded<S: Simd, T: PacketTree>(
         at = next;
         let left = lines.load::<S>(packet, tree.reach(), forms);
         if left == 0 || lines.points_apart::<S>(left) {
+            (at, end) = ahead(at, end, width, rays.len());
             continue;
         }
         if waiting < first {
