@@ -1,3 +1,5 @@
+//! Packets over several structures.
+
 use super::{Nearest, PacketRays, Spread};
 use crate::{
     accel::{

@@ -1,5 +1,8 @@
 //! Packets: up to sixteen rays, one to a lane.
 
+mod alone;
+mod answer;
+mod bounded;
 mod boxes;
 mod lanes;
 mod leaf;
