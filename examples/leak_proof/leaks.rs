@@ -27,7 +27,7 @@ struct Options {
 
 impl Options {
     fn parse(words: &[String]) -> Result<Self, String> {
-        let accel = "bvh2".parse().map_err(|e| format!("{e}"))?;
+        let accel = "bvh8".parse().map_err(|e| format!("{e}"))?;
         let mut out = Self { rays: 10_000_000, judged: 100_000, aimed: 100_000, accel, simd: SimdLevel::best() };
         for pair in words.chunks(2) {
             let [key, value] = pair else { return Err(format!("{}: a value is missing", pair[0])) };
