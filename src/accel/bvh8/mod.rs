@@ -259,7 +259,7 @@ impl Accel for Bvh8 {
         } else {
             let apart =
                 |rays: &[Ray], out: &mut [Option<Hit>]| S::call(ClosestApart { tree: self, prims, rays, forms, out });
-            coherent::closest::<S, Self>(self, prims, rays, packet, forms, out, apart);
+            coherent::closest::<S, Self>(self, prims, (rays, packet), forms, out, apart);
         }
     }
 
@@ -276,7 +276,7 @@ impl Accel for Bvh8 {
             S::call(OccludedApart { tree: self, prims, rays, forms, out });
         } else {
             let apart = |rays: &[Ray], out: &mut [bool]| S::call(OccludedApart { tree: self, prims, rays, forms, out });
-            coherent::occluded::<S, Self>(self, prims, rays, packet, forms, out, apart);
+            coherent::occluded::<S, Self>(self, prims, (rays, packet), forms, out, apart);
         }
     }
 

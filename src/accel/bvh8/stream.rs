@@ -223,6 +223,17 @@ fn fly<S: Simd, const ANY: bool>(
     }
 }
 
+/// Prepares the rays, at most as many as the wings hold: the number of wings in use.
+#[inline(always)]
+fn load<S: Simd>(wings: &mut [Wing; WINGS], tree: &Bvh8, rays: &[Ray], forms: Forms) -> usize {
+    let mut used = 0;
+    for (wing, rays) in wings.iter_mut().zip(rays.chunks(S::F::LEN)) {
+        wing.load::<S>(tree, rays, forms);
+        used += 1;
+    }
+    used
+}
+
 /// The closest hit of every ray.
 pub(super) struct ClosestApart<'a> {
     pub(super) tree: &'a Bvh8,
@@ -240,21 +251,11 @@ impl Task for ClosestApart<'_> {
         let Self { tree, prims, rays, forms, out } = self;
         let mut wings = [const { Wing::EMPTY }; WINGS];
         let mut flights = [const { Flight::IDLE }; IN_FLIGHT];
-        let mut at = 0;
-        while at < rays.len() {
-            let (start, mut used) = (at, 0);
-            while used < WINGS && at < rays.len() {
-                let next = rays.len().min(at + S::F::LEN);
-                wings[used].load::<S>(tree, &rays[at..next], forms);
-                at = next;
-                used += 1;
-            }
+        let many = WINGS * S::F::LEN;
+        for (rays, out) in rays.chunks(many).zip(out.chunks_mut(many)) {
+            let used = load::<S>(&mut wings, tree, rays, forms);
             fly::<S, false>(tree, &mut wings, used, &mut flights);
-            at = start;
-            for wing in &wings[..used] {
-                let next = rays.len().min(at + S::F::LEN);
-                let (rays, out) = (&rays[at..next], &mut out[at..next]);
-                at = next;
+            for ((wing, rays), out) in wings.iter().zip(rays.chunks(S::F::LEN)).zip(out.chunks_mut(S::F::LEN)) {
                 wing.nearest.answer::<S, _>(&wing.rays, &tree.blocks, &AnyHit, out);
                 for i in bits(!wing.taken & (u32::MAX >> (32 - rays.len()))) {
                     out[i] = run::closest_one::<S, Bvh8>(tree, prims, &rays[i], forms);
@@ -281,21 +282,11 @@ impl Task for OccludedApart<'_> {
         let Self { tree, prims, rays, forms, out } = self;
         let mut wings = [const { Wing::EMPTY }; WINGS];
         let mut flights = [const { Flight::IDLE }; IN_FLIGHT];
-        let mut at = 0;
-        while at < rays.len() {
-            let (start, mut used) = (at, 0);
-            while used < WINGS && at < rays.len() {
-                let next = rays.len().min(at + S::F::LEN);
-                wings[used].load::<S>(tree, &rays[at..next], forms);
-                at = next;
-                used += 1;
-            }
+        let many = WINGS * S::F::LEN;
+        for (rays, out) in rays.chunks(many).zip(out.chunks_mut(many)) {
+            let used = load::<S>(&mut wings, tree, rays, forms);
             fly::<S, true>(tree, &mut wings, used, &mut flights);
-            at = start;
-            for wing in &wings[..used] {
-                let next = rays.len().min(at + S::F::LEN);
-                let (rays, out) = (&rays[at..next], &mut out[at..next]);
-                at = next;
+            for ((wing, rays), out) in wings.iter().zip(rays.chunks(S::F::LEN)).zip(out.chunks_mut(S::F::LEN)) {
                 for (i, out) in out.iter_mut().enumerate() {
                     *out = wing.blocked >> i & 1 == 1;
                 }

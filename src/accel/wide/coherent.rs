@@ -1,5 +1,7 @@
 //! Rays that are close together, from their records to their answers by lane: what each of them would need by itself is had for all at once.
 
+use std::ops::Range;
+
 use super::{
     Place,
     packet::{Entry, PacketTree, Stack, Together, descend},
@@ -17,14 +19,62 @@ use crate::{
 /// Packets that are not looked at after one whose rays point apart, because theirs most likely do as well.
 const UNSEEN: usize = 7;
 
-/// Where to go on from `at` in a packet that ends at `end`: the same of the packet that is looked at next.
-#[inline(always)]
-fn ahead(at: usize, end: usize, width: usize, len: usize) -> (usize, usize) {
-    if at < end {
-        return (at, end);
+/// The packets of a batch whose rays go together, one after the other.
+struct Packets<'a> {
+    rays: &'a [Ray],
+    width: usize,
+    /// The ray after the last packet looked at, and the end of the packet that it is in.
+    at: usize,
+    end: usize,
+    /// Rays from here to the next packet point apart.
+    waiting: usize,
+}
+
+/// A packet, and the rays before it that point apart.
+struct Found {
+    apart: Range<usize>,
+    packet: Range<usize>,
+    /// The rays that are prepared.
+    taken: u32,
+}
+
+impl<'a> Packets<'a> {
+    #[inline(always)]
+    fn new(rays: &'a [Ray], width: usize) -> Self {
+        Self { rays, width, at: 0, end: 0, waiting: 0 }
     }
-    let next = len.min(end + UNSEEN * width);
-    (next, next)
+
+    /// Loads and prepares the next packet.
+    #[inline(always)]
+    fn next<S: Simd>(&mut self, lines: &mut PacketRays, reach: f32, forms: Forms) -> Option<Found> {
+        let len = self.rays.len();
+        while self.at < len {
+            if self.at == self.end {
+                self.end = len.min(self.at + self.width);
+            }
+            // The rest of a packet that is longer than a vector follows by itself.
+            let (first, next) = (self.at, self.end.min(self.at + S::F::LEN));
+            self.at = next;
+            let taken = lines.load::<S>(&self.rays[first..next], reach, forms);
+            if taken != 0 && !lines.points_apart::<S>(taken) {
+                lines.prepare::<S>(forms.nodes);
+                let apart = self.waiting..first;
+                self.waiting = next;
+                return Some(Found { apart, packet: first..next, taken });
+            }
+            if self.at == self.end {
+                self.at = len.min(self.end + UNSEEN * self.width);
+                self.end = self.at;
+            }
+        }
+        None
+    }
+
+    /// The rays after the last packet, which point apart.
+    #[inline(always)]
+    fn rest(&self) -> Range<usize> {
+        self.waiting..self.rays.len()
+    }
 }
 
 /// As [`Accel::closest_all`](crate::accel::Accel::closest_all), each `width` rays together; `apart` answers runs of those that point apart.
@@ -32,43 +82,28 @@ fn ahead(at: usize, end: usize, width: usize, len: usize) -> (usize, usize) {
 pub(in crate::accel) fn closest<S: Simd, T: PacketTree>(
     tree: &T,
     prims: &Triangles<'_>,
-    rays: &[Ray],
-    width: usize,
+    (rays, width): (&[Ray], usize),
     forms: Forms,
     out: &mut [Option<Hit>],
     apart: impl Fn(&[Ray], &mut [Option<Hit>]),
 ) {
-    let (mut lines, mut tri) = (PacketRays::EMPTY, Spread::EMPTY);
-    let mut nearest = Nearest::NONE;
-    let (mut at, mut end) = (0, 0);
-    // Rays from here to the packet point apart.
-    let mut waiting = 0;
-    while at < rays.len() {
-        // The rest of a packet that is longer than a vector follows by itself.
-        end = if at == end { rays.len().min(at + width) } else { end };
-        let next = end.min(at + S::F::LEN);
-        let (first, packet) = (at, &rays[at..next]);
-        at = next;
-        let left = lines.load::<S>(packet, tree.reach(), forms);
-        if left == 0 || lines.points_apart::<S>(left) {
-            (at, end) = ahead(at, end, width, rays.len());
-            continue;
+    let (mut lines, mut tri, mut nearest) = (PacketRays::EMPTY, Spread::EMPTY, Nearest::NONE);
+    let mut packets = Packets::new(rays, width);
+    while let Some(found) = packets.next::<S>(&mut lines, tree.reach(), forms) {
+        if !found.apart.is_empty() {
+            apart(&rays[found.apart.clone()], &mut out[found.apart]);
         }
-        if waiting < first {
-            apart(&rays[waiting..first], &mut out[waiting..first]);
-        }
-        waiting = next;
-        let out = &mut out[first..next];
+        let (packet, out) = (&rays[found.packet.clone()], &mut out[found.packet]);
         nearest.clear();
-        lines.prepare::<S>(forms.nodes);
-        closest_in::<S, T, _>(tree, &mut lines, left, &mut nearest, &mut tri, &AnyHit);
+        closest_in::<S, T, _>(tree, &mut lines, found.taken, &mut nearest, &mut tri, &AnyHit);
         nearest.answer::<S, _>(&lines, tree.blocks(), &AnyHit, out);
-        for i in bits(!left & (u32::MAX >> (32 - packet.len()))) {
+        for i in bits(!found.taken & (u32::MAX >> (32 - packet.len()))) {
             out[i] = run::closest_one::<S, T>(tree, prims, &packet[i], forms);
         }
     }
-    if waiting < rays.len() {
-        apart(&rays[waiting..], &mut out[waiting..]);
+    let rest = packets.rest();
+    if !rest.is_empty() {
+        apart(&rays[rest.clone()], &mut out[rest]);
     }
 }
 
@@ -77,43 +112,29 @@ pub(in crate::accel) fn closest<S: Simd, T: PacketTree>(
 pub(in crate::accel) fn occluded<S: Simd, T: PacketTree>(
     tree: &T,
     prims: &Triangles<'_>,
-    rays: &[Ray],
-    width: usize,
+    (rays, width): (&[Ray], usize),
     forms: Forms,
     out: &mut [bool],
     apart: impl Fn(&[Ray], &mut [bool]),
 ) {
     let (mut lines, mut tri) = (PacketRays::EMPTY, Spread::EMPTY);
-    let (mut at, mut end) = (0, 0);
-    // Rays from here to the packet point apart.
-    let mut waiting = 0;
-    while at < rays.len() {
-        // The rest of a packet that is longer than a vector follows by itself.
-        end = if at == end { rays.len().min(at + width) } else { end };
-        let next = end.min(at + S::F::LEN);
-        let (first, packet) = (at, &rays[at..next]);
-        at = next;
-        let left = lines.load::<S>(packet, tree.reach(), forms);
-        if left == 0 || lines.points_apart::<S>(left) {
-            (at, end) = ahead(at, end, width, rays.len());
-            continue;
+    let mut packets = Packets::new(rays, width);
+    while let Some(found) = packets.next::<S>(&mut lines, tree.reach(), forms) {
+        if !found.apart.is_empty() {
+            apart(&rays[found.apart.clone()], &mut out[found.apart]);
         }
-        if waiting < first {
-            apart(&rays[waiting..first], &mut out[waiting..first]);
-        }
-        waiting = next;
-        let out = &mut out[first..next];
-        lines.prepare::<S>(forms.nodes);
-        let blocked = occluded_in::<S, T>(tree, &lines, left, &mut tri);
+        let (packet, out) = (&rays[found.packet.clone()], &mut out[found.packet]);
+        let blocked = occluded_in::<S, T>(tree, &lines, found.taken, &mut tri);
         for (i, out) in out.iter_mut().enumerate() {
             *out = blocked >> i & 1 == 1;
         }
-        for i in bits(!left & (u32::MAX >> (32 - packet.len()))) {
+        for i in bits(!found.taken & (u32::MAX >> (32 - packet.len()))) {
             out[i] = run::occluded_one::<S, T>(tree, prims, &packet[i], forms);
         }
     }
-    if waiting < rays.len() {
-        apart(&rays[waiting..], &mut out[waiting..]);
+    let rest = packets.rest();
+    if !rest.is_empty() {
+        apart(&rays[rest.clone()], &mut out[rest]);
     }
 }
 
