@@ -7,7 +7,7 @@ use crate::{
 };
 
 impl AnyAccel {
-    /// The closest hit of every ray, in order, into `out`; a ray that can hit nothing (see [`TravRay::new`]) misses.
+    /// The closest hit of every ray, in order, into `out`; a ray that can hit nothing (see [`TravRay::new`](super::TravRay::new)) misses.
     ///
     /// Rays go singly where `packet` is 1, else in packets of up to `packet` consecutive ones, which pays for rays close together; structures that answer
     /// many single rays at once take those that point apart by themselves. The answers do not depend on it, nor on `level`. On the calling thread; no allocation.
