@@ -42,25 +42,13 @@ impl<L: Lanes<Elem = f32>> Divided<L> {
     }
 }
 
-impl<L: Lanes<Elem = f32>> Divided<L> {
-    /// t, u and v of one of up to four lanes.
-    #[inline(always)]
-    pub(super) fn tuv(&self, lane: usize) -> [f32; 3] {
-        let (mut t, mut u, mut v) = ([0.0; 4], [0.0; 4], [0.0; 4]);
-        self.t.store(&mut t);
-        self.u.store(&mut u);
-        self.v.store(&mut v);
-        [t[lane & 3], u[lane & 3], v[lane & 3]]
-    }
-}
+/// t, u and v of up to N lanes in memory.
+pub(super) struct Stored<const N: usize>([[f32; N]; 3]);
 
-/// t, u and v of four lanes in memory.
-struct Stored([[f32; 4]; 3]);
-
-impl Stored {
+impl<const N: usize> Stored<N> {
     #[inline(always)]
-    fn new<L: Lanes<Elem = f32>>(divided: &Divided<L>) -> Self {
-        let mut rows = [[0.0; 4]; 3];
+    pub(super) fn new<L: Lanes<Elem = f32>>(divided: &Divided<L>) -> Self {
+        let mut rows = [[0.0; N]; 3];
         divided.t.store(&mut rows[0]);
         divided.u.store(&mut rows[1]);
         divided.v.store(&mut rows[2]);
@@ -68,7 +56,7 @@ impl Stored {
     }
 
     #[inline(always)]
-    fn tuv(&self, lane: usize) -> [f32; 3] {
+    pub(super) fn tuv(&self, lane: usize) -> [f32; 3] {
         let [t, u, v] = &self.0;
         [t[lane], u[lane], v[lane]]
     }
@@ -95,7 +83,7 @@ impl TriBlock {
         if divided.mask == 0 {
             return;
         }
-        let stored = Stored::new(&divided);
+        let stored = Stored::<4>::new(&divided);
         let mut mask = divided.mask;
         while mask != 0 {
             let lane = (mask.trailing_zeros() & 3) as usize;
@@ -114,7 +102,7 @@ impl TriBlock {
         if divided.mask == 0 || K::ACCEPTS_ALL {
             return divided.mask != 0;
         }
-        let stored = Stored::new(&divided);
+        let stored = Stored::<4>::new(&divided);
         let mut mask = divided.mask;
         while mask != 0 {
             let lane = (mask.trailing_zeros() & 3) as usize;

@@ -18,20 +18,10 @@ impl World {
         self.groups.len() <= FLAT && self.groups.iter().all(|group| group.rigid.is_none() && group.accel.takes_lanes())
     }
 
-    /// Greatest absolute coordinate of what is traced.
-    #[inline(always)]
-    fn reach(&self) -> f32 {
-        let mut reach = 0.0_f32;
-        for group in &self.groups {
-            reach = reach.max(group.bounds.reach());
-        }
-        reach
-    }
-
     /// False when nothing was answered, since the rays point apart.
     #[inline(always)]
     pub(super) fn nearest_by_lane<S: Simd>(&self, rays: &[Ray], hits: &mut [Option<Hit>]) -> bool {
-        let (mut packet, reach) = (LanePacket::EMPTY, self.reach());
+        let (mut packet, reach) = (LanePacket::EMPTY, self.top.reach());
         for first in (0..rays.len()).step_by(S::F::LEN) {
             let end = rays.len().min(first + S::F::LEN);
             let (rays, hits) = (&rays[first..end], &mut hits[first..end]);
@@ -67,7 +57,7 @@ impl World {
     /// `None` when nothing was answered, since the rays point apart.
     #[inline(always)]
     pub(super) fn blocked_by_lane<S: Simd>(&self, rays: &[Ray]) -> Option<u32> {
-        let (mut packet, reach) = (LanePacket::EMPTY, self.reach());
+        let (mut packet, reach) = (LanePacket::EMPTY, self.top.reach());
         let mut blocked = 0;
         for first in (0..rays.len()).step_by(S::F::LEN) {
             let rays = &rays[first..rays.len().min(first + S::F::LEN)];

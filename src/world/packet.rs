@@ -66,6 +66,7 @@ impl World {
     #[inline(always)]
     pub fn nearest_hits<S: Simd>(&self, rays: &[Ray], hits: &mut [Option<Hit>]) {
         assert!(rays.len() <= PACKET && rays.len() <= hits.len(), "at most {PACKET} rays, a hit for each");
+        hits[rays.len()..].fill(None);
         if self.takes_lanes() && self.nearest_by_lane::<S>(rays, hits) {
             return;
         }

@@ -19,7 +19,7 @@ use crate::{
     accel::{
         Closest, Counter, HitSink, TravRay,
         block::{BlockRay, Evaluated, NO_PRIM, Spilled, TriBlock, Volumes, Weights, cross, dot, norm1, splat3, sub},
-        fast::{Divided, accepts},
+        fast::{Divided, Stored, accepts},
         query::blocks,
     },
     geom::{PrimId, exact::BOUND},
@@ -168,26 +168,6 @@ pub(super) fn widely<S: Simd>(
     Evaluated::new(&volumes, open, &weights)
 }
 
-/// t, u and v of a packet's rays in memory.
-struct Stored([[f32; PACKET]; 3]);
-
-impl Stored {
-    #[inline(always)]
-    fn new<L: Lanes<Elem = f32>>(divided: &Divided<L>) -> Self {
-        let mut rows = [[0.0; PACKET]; 3];
-        divided.t.store(&mut rows[0]);
-        divided.u.store(&mut rows[1]);
-        divided.v.store(&mut rows[2]);
-        Self(rows)
-    }
-
-    #[inline(always)]
-    fn tuv(&self, ray: usize) -> [f32; 3] {
-        let [t, u, v] = &self.0;
-        [t[ray], u[ray], v[ray]]
-    }
-}
-
 impl TriBlock {
     /// Offers every triangle of the block to the active rays that it may beat the best of.
     #[inline(always)]
@@ -226,7 +206,7 @@ impl TriBlock {
                 let (near, limit) = (S::F::load(&packet.t_near32), S::F::load(&packet.t_cull));
                 let divided = Divided::new(volumes, open, near, limit);
                 if divided.mask != 0 {
-                    let stored = Stored::new(&divided);
+                    let stored = Stored::<PACKET>::new(&divided);
                     for i in bits(divided.mask) {
                         best[i].keep_fast(stored.tuv(i), prim, &sinks[i]);
                         packet.set_limit(i, &best[i]);
@@ -295,7 +275,7 @@ impl TriBlock {
                 if K::ACCEPTS_ALL {
                     blocked |= divided.mask;
                 } else if divided.mask != 0 {
-                    let stored = Stored::new(&divided);
+                    let stored = Stored::<PACKET>::new(&divided);
                     for i in bits(divided.mask) {
                         blocked |= u32::from(accepts(stored.tuv(i), prim, &sinks[i])) << i;
                     }

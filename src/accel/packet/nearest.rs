@@ -11,7 +11,7 @@ use crate::{
     accel::{
         HitSink,
         block::{NO_PRIM, TriBlock},
-        fast::Divided,
+        fast::{Divided, Stored},
         query::round_up,
     },
     geom::{InstanceId, PrimId, exact::TriangleHit},
@@ -164,14 +164,17 @@ impl Nearest {
         let block = &blocks[number];
         if packet.fast {
             let divided = block.test_fast::<S>(&packet.range(i), packet.t_cull[i]);
+            if divided.mask == 0 {
+                return;
+            }
+            let stored = Stored::<4>::new(&divided);
             for lane in bits(divided.mask) {
-                let [t, u, v] = divided.tuv(lane);
+                let lane = lane % 4;
+                let [t, u, v] = stored.tuv(lane);
                 #[expect(clippy::cast_possible_truncation, reason = "there are fewer than 2^28 blocks")]
                 let place = (4 * number + lane) as u32;
                 let limit = packet.t_cull[i];
-                if block.prim(lane % 4) != NO_PRIM
-                    && (t < limit || t <= limit && self.gives_way(blocks, i, place, sink))
-                {
+                if block.prim(lane) != NO_PRIM && (t < limit || t <= limit && self.gives_way(blocks, i, place, sink)) {
                     (packet.t_cull[i], self.fast[0][i], self.fast[1][i]) = (t, u, v);
                     self.place[i] = place;
                 }
