@@ -8,7 +8,7 @@ use super::{FrameConfig, FrameError, FrameLoop, RebuildPolicy, grouping::Groupin
 use crate::{
     accel::PACKET,
     anim::ActiveClip,
-    geom::{Forms, Hit, Ray},
+    geom::{Forms, Hit, InstanceId, PrimId, Ray},
     scene::{ClipId, Scene},
     simd::{Scalar, Simd, SimdLevel, Task, dispatch},
     world::World,
@@ -78,11 +78,15 @@ impl Task for Together<'_> {
         let Self(world, rays) = self;
         let singly = rays.iter().map(|ray| world.nearest_hit::<S>(ray)).collect();
         let blocked_singly = rays.iter().map(|ray| world.is_blocked::<S>(ray)).collect();
-        let (mut hits, mut blocked) = (vec![None; rays.len()], Vec::new());
+        let (mut hits, mut blocked) = (Vec::new(), Vec::new());
+        let left_over = Hit { t: 1.0, u: 0.0, v: 0.0, prim: PrimId(0), instance: InstanceId(0) };
         let (mut first, mut len) = (0, 1);
         while first < rays.len() {
             let end = rays.len().min(first + len);
-            world.nearest_hits::<S>(&rays[first..end], &mut hits[first..end]);
+            let mut found = [Some(left_over); PACKET];
+            world.nearest_hits::<S>(&rays[first..end], &mut found);
+            assert!(found[end - first..].iter().all(Option::is_none), "hits without rays");
+            hits.extend(&found[..end - first]);
             let mask = world.blocked::<S>(&rays[first..end]);
             blocked.extend((0..end - first).map(|i| (mask >> i) & 1 == 1));
             (first, len) = (end, len % PACKET + 1);
@@ -99,9 +103,18 @@ fn packets_answer_as_single_rays_do() {
         Ray::new(Vec3::new(0.0, 0.3, 6.0), dir)
     };
     let rays: Vec<Ray> = (0..625).map(ray).collect();
-    for (accel, grouping) in [("list", Grouping::ByMotion), ("bvh2", Grouping::ByMotion), ("bvh2", Grouping::Single)] {
+    let cases = [
+        ("list", Grouping::ByMotion, bodies(12)),
+        ("bvh2", Grouping::ByMotion, bodies(12)),
+        ("bvh2", Grouping::Single, bodies(12)),
+        ("bvh8", Grouping::ByMotion, bodies(12)),
+        // Nothing rigid: packets go by lane through several groups.
+        ("bvh8", Grouping::ByMotion, figure(20)),
+        ("bvh8", Grouping::Single, figure(20)),
+    ];
+    for (accel, grouping, second) in cases {
         let mut frames = FrameLoop::with_grouping(config(accel, RebuildPolicy::Refit), grouping).unwrap();
-        for (i, scene) in (0_u8..).zip([figure(30), bodies(12), still()]) {
+        for (i, scene) in (0_u8..).zip([figure(30), second, still()]) {
             frames.add(Arc::new(scene), DAffine3::from_translation(DVec3::new(f64::from(i) - 1.0, 0.0, 0.0)));
         }
         let clip = at(0.7);
