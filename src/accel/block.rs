@@ -52,6 +52,9 @@ pub(super) struct BlockBounds {
 }
 
 impl TriBlock {
+    /// No triangles.
+    pub(super) const EMPTY: Self = Self { corners: [[[0.0; 4]; 3]; 3], prims: [NO_PRIM; 4] };
+
     /// A block of up to four triangles, from the first lane on, whose corners are still to be set by [`TriBlock::refit`].
     pub(super) fn new(prims: [u32; 4]) -> Self {
         Self { corners: [[[0.0; 4]; 3]; 3], prims }

@@ -172,6 +172,11 @@ pub trait Accel: Sized + Clone + Send + Sync + std::fmt::Debug + 'static {
     /// What a walk leaves for rays that start where it ended; `()` where nothing is gained.
     type RayState: Clone + Default + std::fmt::Debug;
 
+    /// As [`Accel::NODE_FORMAT`], of this structure.
+    fn node_format(&self) -> &'static str {
+        Self::NODE_FORMAT
+    }
+
     /// Builds over `prims`, in the current rayon pool.
     ///
     /// # Errors

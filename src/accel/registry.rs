@@ -129,10 +129,10 @@ macro_rules! register_accels {
                 }
             }
 
-            /// As [`Accel::NODE_FORMAT`].
+            /// As [`Accel::node_format`].
             pub fn node_format(&self) -> &'static str {
                 match self {
-                    $(Self::$kind(_) => <$ty>::NODE_FORMAT,)*
+                    $(Self::$kind(a) => a.node_format(),)*
                 }
             }
 

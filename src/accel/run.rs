@@ -3,7 +3,7 @@
 use super::{
     Accel, AnyHit, Closest, Counter, HitSink, PACKET, TravRay,
     packet::{LanePacket, bits},
-    wide::{coherent, packet::PacketTree},
+    wide::{coherent, packet::BlockTree},
 };
 use crate::{
     geom::{Forms, Hit, Ray, Triangles},
@@ -302,7 +302,7 @@ pub(super) struct ClosestLanes<'a, T, K> {
     pub(super) sink: &'a K,
 }
 
-impl<T: PacketTree, K: HitSink> Task for ClosestLanes<'_, T, K> {
+impl<T: BlockTree, K: HitSink> Task for ClosestLanes<'_, T, K> {
     type Output = ();
 
     #[inline(always)]
@@ -321,7 +321,7 @@ pub(super) struct OccludedLanes<'a, T> {
     pub(super) open: u32,
 }
 
-impl<T: PacketTree> Task for OccludedLanes<'_, T> {
+impl<T: BlockTree> Task for OccludedLanes<'_, T> {
     type Output = u32;
 
     #[inline(always)]

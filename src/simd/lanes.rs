@@ -34,6 +34,15 @@ pub trait Simd: Copy + Send + Sync + 'static {
     /// The columns of as many records as `F` has lanes: number j of record i goes to lane i of row j. Panics when there are fewer records.
     fn columns(records: &[[f32; 8]], to: &mut [[f32; 16]; 8]);
 
+    /// The columns of eight records: number j of record i goes to lane i of row j.
+    fn eight_columns(records: &[[f32; 8]; 8], to: &mut [[f32; 8]; 8]);
+
+    /// Eight bytes as numbers.
+    fn of_bytes(bytes: &[u8; 8]) -> Self::F8;
+
+    /// Eight whole numbers, each from 0 to 255, as bytes.
+    fn to_bytes(numbers: Self::F8) -> [u8; 8];
+
     /// The least and the greatest number of the chosen lanes; infinity and its negative where there are none. No number may be NaN.
     fn range(numbers: Self::F, chosen: u32) -> [f32; 2];
 
@@ -133,6 +142,9 @@ pub trait Halves: Lanes<Elem = f32> {
     /// `[2, 3, 2, 3]`.
     #[must_use]
     fn high_half(self) -> Self;
+    /// `[1, 2, 0, 3]`.
+    #[must_use]
+    fn rotated(self) -> Self;
     /// Lane 0.
     fn first(self) -> f32;
     /// Lane 1.

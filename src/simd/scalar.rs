@@ -40,6 +40,26 @@ impl Simd for Scalar {
     }
 
     #[inline(always)]
+    fn eight_columns(records: &[[f32; 8]; 8], to: &mut [[f32; 8]; 8]) {
+        for (lane, record) in records.iter().enumerate() {
+            for (row, &number) in to.iter_mut().zip(record) {
+                row[lane] = number;
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn of_bytes(bytes: &[u8; 8]) -> Self::F8 {
+        Array(bytes.map(f32::from))
+    }
+
+    #[inline(always)]
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "whole numbers of that range")]
+    fn to_bytes(numbers: Self::F8) -> [u8; 8] {
+        numbers.0.map(|number| number as u8)
+    }
+
+    #[inline(always)]
     fn range(numbers: Self::F, chosen: u32) -> [f32; 2] {
         let least = Lanes::select(chosen, numbers, Array([f32::INFINITY; 8]));
         let greatest = Lanes::select(chosen, numbers, Array([f32::NEG_INFINITY; 8]));
@@ -265,6 +285,11 @@ impl Halves for Array<f32, 4> {
     fn high_half(self) -> Self {
         let [_, _, c, d] = self.0;
         Self([c, d, c, d])
+    }
+    #[inline(always)]
+    fn rotated(self) -> Self {
+        let [a, b, c, d] = self.0;
+        Self([b, c, a, d])
     }
     #[inline(always)]
     fn first(self) -> f32 {

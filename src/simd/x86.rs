@@ -52,16 +52,30 @@ impl Simd for Avx2 {
     fn columns(records: &[[f32; 8]], to: &mut [[f32; 16]; 8]) {
         let records: &[[f32; 8]; 8] = records[..8].try_into().expect("the slice has that length");
         for half in 0..2 {
-            // Four numbers of records 0 to 3 below those of records 4 to 7.
-            let (a, b) = (far_pair(records, 0, 4 * half), far_pair(records, 1, 4 * half));
-            let (c, d) = (far_pair(records, 2, 4 * half), far_pair(records, 3, 4 * half));
-            let (ab, cd) = (call!(_mm256_unpacklo_ps(a, b)), call!(_mm256_unpacklo_ps(c, d)));
-            F32x8(call!(_mm256_shuffle_ps::<LOWS>(ab, cd))).store(&mut to[4 * half]);
-            F32x8(call!(_mm256_shuffle_ps::<HIGHS>(ab, cd))).store(&mut to[4 * half + 1]);
-            let (ab, cd) = (call!(_mm256_unpackhi_ps(a, b)), call!(_mm256_unpackhi_ps(c, d)));
-            F32x8(call!(_mm256_shuffle_ps::<LOWS>(ab, cd))).store(&mut to[4 * half + 2]);
-            F32x8(call!(_mm256_shuffle_ps::<HIGHS>(ab, cd))).store(&mut to[4 * half + 3]);
+            let [a, b, c, d] = four_columns(records, half);
+            a.store(&mut to[4 * half]);
+            b.store(&mut to[4 * half + 1]);
+            c.store(&mut to[4 * half + 2]);
+            d.store(&mut to[4 * half + 3]);
         }
+    }
+
+    #[inline(always)]
+    fn eight_columns(records: &[[f32; 8]; 8], to: &mut [[f32; 8]; 8]) {
+        eight_columns(records, to);
+    }
+
+    #[inline(always)]
+    fn of_bytes(bytes: &[u8; 8]) -> F32x8 {
+        of_bytes(bytes)
+    }
+
+    #[inline(always)]
+    fn to_bytes(numbers: F32x8) -> [u8; 8] {
+        let words = call!(_mm256_cvttps_epi32(numbers.0));
+        let (low, high) = (call!(_mm256_castsi256_si128(words)), call!(_mm256_extracti128_si256::<UPPER>(words)));
+        let halves = call!(_mm_packus_epi32(low, high));
+        call!(_mm_cvtsi128_si64(call!(_mm_packus_epi16(halves, halves)))).to_le_bytes()
     }
 
     #[inline(always)]
@@ -181,6 +195,22 @@ impl Simd for Avx512 {
     }
 
     #[inline(always)]
+    fn eight_columns(records: &[[f32; 8]; 8], to: &mut [[f32; 8]; 8]) {
+        eight_columns(records, to);
+    }
+
+    #[inline(always)]
+    fn of_bytes(bytes: &[u8; 8]) -> F32x8 {
+        of_bytes(bytes)
+    }
+
+    #[inline(always)]
+    fn to_bytes(numbers: F32x8) -> [u8; 8] {
+        let words = call!(_mm256_cvttps_epi32(numbers.0));
+        call!(_mm_cvtsi128_si64(call!(_mm256_cvtepi32_epi8(words)))).to_le_bytes()
+    }
+
+    #[inline(always)]
     fn range(numbers: F32x16, chosen: u32) -> [f32; 2] {
         let least = F32x16::select(chosen, numbers, F32x16::splat(f32::INFINITY));
         let greatest = F32x16::select(chosen, numbers, F32x16::splat(f32::NEG_INFINITY));
@@ -276,6 +306,39 @@ const UPPER: i32 = 1;
 fn far_pair(records: &[[f32; 8]; 8], i: usize, at: usize) -> __m256 {
     let (low, high) = (F32x4::load(&records[i][at..]), F32x4::load(&records[i + 4][at..]));
     call!(_mm256_insertf128_ps::<UPPER>(call!(_mm256_castps128_ps256(low.0)), high.0))
+}
+
+/// Rows `4 * half` to `4 * half + 3` of the columns of eight records.
+#[inline(always)]
+fn four_columns(records: &[[f32; 8]; 8], half: usize) -> [F32x8; 4] {
+    // Four numbers of records 0 to 3 below those of records 4 to 7.
+    let (a, b) = (far_pair(records, 0, 4 * half), far_pair(records, 1, 4 * half));
+    let (c, d) = (far_pair(records, 2, 4 * half), far_pair(records, 3, 4 * half));
+    let (ab, cd) = (call!(_mm256_unpacklo_ps(a, b)), call!(_mm256_unpacklo_ps(c, d)));
+    let (ef, gh) = (call!(_mm256_unpackhi_ps(a, b)), call!(_mm256_unpackhi_ps(c, d)));
+    [
+        F32x8(call!(_mm256_shuffle_ps::<LOWS>(ab, cd))),
+        F32x8(call!(_mm256_shuffle_ps::<HIGHS>(ab, cd))),
+        F32x8(call!(_mm256_shuffle_ps::<LOWS>(ef, gh))),
+        F32x8(call!(_mm256_shuffle_ps::<HIGHS>(ef, gh))),
+    ]
+}
+
+#[inline(always)]
+fn eight_columns(records: &[[f32; 8]; 8], to: &mut [[f32; 8]; 8]) {
+    for half in 0..2 {
+        let [a, b, c, d] = four_columns(records, half);
+        a.store(&mut to[4 * half]);
+        b.store(&mut to[4 * half + 1]);
+        c.store(&mut to[4 * half + 2]);
+        d.store(&mut to[4 * half + 3]);
+    }
+}
+
+#[inline(always)]
+fn of_bytes(bytes: &[u8; 8]) -> F32x8 {
+    let bytes = call!(_mm_cvtsi64_si128(i64::from_le_bytes(*bytes)));
+    F32x8(call!(_mm256_cvtepi32_ps(call!(_mm256_cvtepu8_epi32(bytes)))))
 }
 
 /// Record i below record i + 4.
@@ -590,6 +653,11 @@ impl Halves for F32x4 {
     #[inline(always)]
     fn high_half(self) -> Self {
         Self(call!(_mm_movehl_ps(self.0, self.0)))
+    }
+    #[inline(always)]
+    fn rotated(self) -> Self {
+        const ROTATED: i32 = 0b11_00_10_01;
+        Self(call!(_mm_shuffle_ps::<ROTATED>(self.0, self.0)))
     }
     #[inline(always)]
     fn first(self) -> f32 {

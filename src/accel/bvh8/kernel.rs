@@ -1,8 +1,9 @@
 //! Eight boxes against one ray.
 
 use super::{
-    Bvh8,
-    node::{Link, Node},
+    format::Format,
+    node::{EightNode, Link},
+    tree::Tree8,
 };
 use crate::{
     accel::{
@@ -13,10 +14,11 @@ use crate::{
         slabs::{self, Line},
         topology::MAX_DEPTH,
         wide::{
-            Place, Tree, WIDTH,
+            Place, Tree, WIDTH, WideNode,
             walk::{self, Kernel},
         },
     },
+    geom::Triangles,
     simd::{Lanes, Scalar, Simd, Stack, Task},
 };
 
@@ -83,19 +85,19 @@ impl Boxes {
     /// Where the ray enters each child, and bits of the children that it may meet before the limit. Each walk waits for this, so the chain of operations is as
     /// short as can be.
     #[inline(always)]
-    pub(super) fn test<S: Simd>(&self, node: &Node) -> (S::F8, u32) {
+    pub(super) fn test<S: Simd>(&self, node: &impl EightNode) -> (S::F8, u32) {
         let (t_near, limit) = (S::F8::splat(self.t_near), S::F8::splat(self.limit));
         let (mut entries, mut exits) = ([t_near; 3], [limit; 3]);
         let Line { entry_mul, entry_add, exit_mul, exit_add } = &self.line;
         for axis in 0..3 {
             let side = usize::from(self.backward[axis] & 1);
-            let (first, last) = (S::F8::load(&node.planes[axis][side]), S::F8::load(&node.planes[axis][side ^ 1]));
+            let (first, last) = (node.planes::<S>(axis, side), node.planes::<S>(axis, side ^ 1));
             entries[axis] = first.mul_add_loose(S::F8::splat(entry_mul[axis]), S::F8::splat(entry_add[axis]));
             exits[axis] = last.mul_add_loose(S::F8::splat(exit_mul[axis]), S::F8::splat(exit_add[axis]));
         }
         let near = entries[0].max(entries[1]).max(entries[2].max(t_near));
         let far = exits[0].min(exits[1]).min(exits[2].min(limit));
-        (near, near.le(far))
+        (near, near.le(far) & node.present())
     }
 }
 
@@ -128,45 +130,47 @@ fn first(hits: u32) -> usize {
 }
 
 /// Offers the triangles of a leaf.
-pub(super) struct ClosestLeaf<'a, C, K> {
-    pub(super) tree: &'a Bvh8,
+pub(super) struct ClosestLeaf<'a, F: Format, C, K> {
+    pub(super) tree: &'a Tree8<F>,
     pub(super) link: Link,
-    pub(super) ray: &'a TravRay,
+    pub(super) ray: (&'a TravRay, &'a Triangles<'a>),
     pub(super) best: &'a mut Closest,
     pub(super) sink: &'a K,
     pub(super) count: &'a mut C,
 }
 
-impl<C: Counter, K: HitSink> Task for ClosestLeaf<'_, C, K> {
+impl<F: Format, C: Counter, K: HitSink> Task for ClosestLeaf<'_, F, C, K> {
     type Output = ();
 
     #[inline(always)]
     fn run<S: Simd>(self) {
-        let Self { tree, link, ray, best, sink, count } = self;
-        let block_ray = BlockRay::new(ray, tree.reach);
-        for block in tree.leaf_blocks(link, count) {
+        let Self { tree, link, ray: (ray, prims), best, sink, count } = self;
+        let (block_ray, mut room) = (BlockRay::new(ray, tree.reach), TriBlock::EMPTY);
+        for i in 0..tree.span(link) {
+            let block = tree.block((link, i), prims, &mut room, count);
             block.closest::<S, C, K>(ray, &block_ray, best, sink, count);
         }
     }
 }
 
 /// Whether a triangle of a leaf blocks a ray.
-pub(super) struct OccludedLeaf<'a, C, K> {
-    pub(super) tree: &'a Bvh8,
+pub(super) struct OccludedLeaf<'a, F: Format, C, K> {
+    pub(super) tree: &'a Tree8<F>,
     pub(super) link: Link,
-    pub(super) ray: &'a TravRay,
+    pub(super) ray: (&'a TravRay, &'a Triangles<'a>),
     pub(super) sink: &'a K,
     pub(super) count: &'a mut C,
 }
 
-impl<C: Counter, K: HitSink> Task for OccludedLeaf<'_, C, K> {
+impl<F: Format, C: Counter, K: HitSink> Task for OccludedLeaf<'_, F, C, K> {
     type Output = bool;
 
     #[inline(always)]
     fn run<S: Simd>(self) -> bool {
-        let Self { tree, link, ray, sink, count } = self;
-        let block_ray = BlockRay::new(ray, tree.reach);
-        for block in tree.leaf_blocks(link, count) {
+        let Self { tree, link, ray: (ray, prims), sink, count } = self;
+        let (block_ray, mut room) = (BlockRay::new(ray, tree.reach), TriBlock::EMPTY);
+        for i in 0..tree.span(link) {
+            let block = tree.block((link, i), prims, &mut room, count);
             if block.occluded::<S, C, K>(ray, &block_ray, sink, count) {
                 return true;
             }
@@ -177,15 +181,15 @@ impl<C: Counter, K: HitSink> Task for OccludedLeaf<'_, C, K> {
 
 /// Offers the triangles below a node or leaf to a ray whose f32 tests are proven, nearest children first.
 #[inline(always)]
-fn closest<S: Simd, C: Counter, K: HitSink>(
-    tree: &Bvh8,
+fn closest<S: Simd, F: Format, C: Counter, K: HitSink>(
+    tree: &Tree8<F>,
     start: Link,
-    ray: &TravRay,
+    ray: (&TravRay, &Triangles<'_>),
     best: &mut Closest,
     sink: &K,
     count: &mut C,
 ) {
-    let mut boxes = Boxes::new::<S>(ray, tree.reach, best.t_cull());
+    let mut boxes = Boxes::new::<S>(ray.0, tree.reach, best.t_cull());
     let mut stack = Stack::<u64, MAX_STACK>::new();
     let mut link = start;
     loop {
@@ -200,11 +204,11 @@ fn closest<S: Simd, C: Counter, K: HitSink>(
             if hits != 0 {
                 let mut entries = [0.0; WIDTH];
                 near.store(&mut entries);
-                let child = |slot: usize| due(entries[slot], node.links[slot]);
+                let child = |slot: usize| due(entries[slot], node.word(slot));
                 let slot = first(hits);
                 hits &= hits - 1;
                 if hits == 0 {
-                    link = node.links[slot].predicted();
+                    link = node.word(slot).predicted();
                     continue;
                 }
                 let (mut near, mut far) = (child(slot), child(first(hits)));
@@ -243,8 +247,14 @@ fn closest<S: Simd, C: Counter, K: HitSink>(
 
 /// True when a triangle below a node or leaf blocks a ray whose f32 tests are proven.
 #[inline(always)]
-fn occluded<S: Simd, C: Counter, K: HitSink>(tree: &Bvh8, start: Link, ray: &TravRay, sink: &K, count: &mut C) -> bool {
-    let boxes = Boxes::new::<S>(ray, tree.reach, ray.range().t_far);
+fn occluded<S: Simd, F: Format, C: Counter, K: HitSink>(
+    tree: &Tree8<F>,
+    start: Link,
+    ray: (&TravRay, &Triangles<'_>),
+    sink: &K,
+    count: &mut C,
+) -> bool {
+    let boxes = Boxes::new::<S>(ray.0, tree.reach, ray.0.range().t_far);
     let mut stack = Stack::<Link, MAX_STACK>::new();
     let mut link = start;
     loop {
@@ -257,10 +267,10 @@ fn occluded<S: Simd, C: Counter, K: HitSink>(tree: &Bvh8, start: Link, ray: &Tra
             let node = &tree.nodes[link.index()];
             let (_, mut hits) = boxes.test::<S>(node);
             if hits != 0 {
-                link = node.links[first(hits)].predicted();
+                link = node.word(first(hits)).predicted();
                 hits &= hits - 1;
                 while hits != 0 {
-                    stack.push(node.links[first(hits)]);
+                    stack.push(node.word(first(hits)));
                     hits &= hits - 1;
                 }
                 continue;
@@ -295,7 +305,7 @@ impl WideKernel {
     }
 }
 
-impl Kernel<Bvh8> for WideKernel {
+impl<F: Format> Kernel<Tree8<F>> for WideKernel {
     type Mark = f64;
     type Kids = [f64; WIDTH];
 
@@ -303,13 +313,13 @@ impl Kernel<Bvh8> for WideKernel {
         [0.0; WIDTH]
     }
 
-    fn test(&self, node: &Node, _entry: f64, entries: &mut [f64; WIDTH]) -> u32 {
+    fn test(&self, node: &F::Node, _entry: f64, entries: &mut [f64; WIDTH]) -> u32 {
         let mut hits = 0;
         for (child, at) in entries.iter_mut().enumerate() {
             let (mut near, mut far) = (self.t_near, self.limit);
             for axis in 0..3 {
                 let plane =
-                    |side: usize| (f64::from(node.planes[axis][side][child]) - self.origin[axis]) * self.inv[axis];
+                    |side: usize| (f64::from(node.plane(axis, side, child)) - self.origin[axis]) * self.inv[axis];
                 let backward = usize::from(self.inv[axis] < 0.0);
                 let (entry, exit) = (plane(backward) * (2.0 - WIDEN), plane(1 - backward) * WIDEN);
                 near = if entry > near { entry } else { near };
@@ -318,7 +328,7 @@ impl Kernel<Bvh8> for WideKernel {
             hits |= u32::from(near <= far) << child;
             *at = near;
         }
-        hits
+        hits & node.present()
     }
 
     fn mark(entries: &[f64; WIDTH], slot: usize) -> f64 {
@@ -343,45 +353,45 @@ impl Kernel<Bvh8> for WideKernel {
 }
 
 /// The closest hit of one ordinary ray below a node.
-pub(super) struct ClosestFrom<'a, C, K> {
-    pub(super) tree: &'a Bvh8,
+pub(super) struct ClosestFrom<'a, F: Format, C, K> {
+    pub(super) tree: &'a Tree8<F>,
     pub(super) start: Link,
-    pub(super) ray: &'a TravRay,
+    pub(super) ray: (&'a TravRay, &'a Triangles<'a>),
     pub(super) best: &'a mut Closest,
     pub(super) sink: &'a K,
     pub(super) count: &'a mut C,
 }
 
-impl<C: Counter, K: HitSink> Task for ClosestFrom<'_, C, K> {
+impl<F: Format, C: Counter, K: HitSink> Task for ClosestFrom<'_, F, C, K> {
     type Output = ();
 
     #[inline(always)]
     fn run<S: Simd>(self) {
         let Self { tree, start, ray, best, sink, count } = self;
-        closest::<S, C, K>(tree, start, ray, best, sink, count);
+        closest::<S, F, C, K>(tree, start, ray, best, sink, count);
     }
 }
 
 /// As [`ClosestFrom`]: whether anything is hit.
-pub(super) struct OccludedFrom<'a, C, K> {
-    pub(super) tree: &'a Bvh8,
+pub(super) struct OccludedFrom<'a, F: Format, C, K> {
+    pub(super) tree: &'a Tree8<F>,
     pub(super) start: Link,
-    pub(super) ray: &'a TravRay,
+    pub(super) ray: (&'a TravRay, &'a Triangles<'a>),
     pub(super) sink: &'a K,
     pub(super) count: &'a mut C,
 }
 
-impl<C: Counter, K: HitSink> Task for OccludedFrom<'_, C, K> {
+impl<F: Format, C: Counter, K: HitSink> Task for OccludedFrom<'_, F, C, K> {
     type Output = bool;
 
     #[inline(always)]
     fn run<S: Simd>(self) -> bool {
         let Self { tree, start, ray, sink, count } = self;
-        occluded::<S, C, K>(tree, start, ray, sink, count)
+        occluded::<S, F, C, K>(tree, start, ray, sink, count)
     }
 }
 
-impl Bvh8 {
+impl<F: Format> Tree8<F> {
     pub(super) fn root() -> Link {
         Link::inner(0)
     }
@@ -395,13 +405,13 @@ impl Bvh8 {
     #[inline(always)]
     pub(super) fn walk_closest<S: Simd, C: Counter, K: HitSink>(
         &self,
-        ray: &TravRay,
+        ray: (&TravRay, &Triangles<'_>),
         best: &mut Closest,
         sink: &K,
         count: &mut C,
     ) {
-        if self.fits(ray) {
-            closest::<S, C, K>(self, Self::root(), ray, best, sink, count);
+        if self.fits(ray.0) {
+            closest::<S, F, C, K>(self, Self::root(), ray, best, sink, count);
         } else {
             self.closest_wide(ray, best, sink, count);
         }
@@ -412,24 +422,24 @@ impl Bvh8 {
     #[inline(never)]
     pub(super) fn closest_wide<C: Counter, K: HitSink>(
         &self,
-        ray: &TravRay,
+        ray: (&TravRay, &Triangles<'_>),
         best: &mut Closest,
         sink: &K,
         count: &mut C,
     ) {
-        let (test, start) = (WideKernel::new(ray, best.t_high()), (Self::root(), f64::from(ray.range().t_near)));
+        let (test, start) = (WideKernel::new(ray.0, best.t_high()), (Self::root(), f64::from(ray.0.range().t_near)));
         walk::closest::<Scalar, _, _, C, K>(self, test, start, ray, best, sink, count);
     }
 
     #[inline(always)]
     pub(super) fn walk_occluded<S: Simd, C: Counter, K: HitSink>(
         &self,
-        ray: &TravRay,
+        ray: (&TravRay, &Triangles<'_>),
         sink: &K,
         count: &mut C,
     ) -> bool {
-        if self.fits(ray) {
-            occluded::<S, C, K>(self, Self::root(), ray, sink, count)
+        if self.fits(ray.0) {
+            occluded::<S, F, C, K>(self, Self::root(), ray, sink, count)
         } else {
             self.occluded_wide(ray, sink, count)
         }
@@ -437,17 +447,23 @@ impl Bvh8 {
 
     #[cold]
     #[inline(never)]
-    pub(super) fn occluded_wide<C: Counter, K: HitSink>(&self, ray: &TravRay, sink: &K, count: &mut C) -> bool {
-        let (near, far) = (f64::from(ray.range().t_near), f64::from(ray.range().t_far));
-        walk::occluded::<Scalar, _, _, C, K>(self, &WideKernel::new(ray, far), (Self::root(), near), ray, sink, count)
+    pub(super) fn occluded_wide<C: Counter, K: HitSink>(
+        &self,
+        ray: (&TravRay, &Triangles<'_>),
+        sink: &K,
+        count: &mut C,
+    ) -> bool {
+        let (near, far) = (f64::from(ray.0.range().t_near), f64::from(ray.0.range().t_far));
+        walk::occluded::<Scalar, _, _, C, K>(self, &WideKernel::new(ray.0, far), (Self::root(), near), ray, sink, count)
     }
 }
 
 /// The children of a node that a ray meets, in f32 and in f64.
 #[cfg(test)]
 #[inline(always)]
-pub(super) fn met<S: Simd>(ray: &TravRay, node: &Node, reach: f32) -> [u32; 2] {
+pub(super) fn met<S: Simd, F: Format>(ray: &TravRay, node: &F::Node, reach: f32) -> [u32; 2] {
     let t_far = ray.range().t_far;
     let (fast, wide) = (Boxes::new::<S>(ray, reach, t_far), WideKernel::new(ray, f64::from(t_far)));
-    [fast.test::<S>(node).1, wide.test(node, 0.0, &mut [0.0; WIDTH])]
+    let wide = Kernel::<Tree8<F>>::test(&wide, node, 0.0, &mut [0.0; WIDTH]);
+    [fast.test::<S>(node).1 & 0xff, wide]
 }

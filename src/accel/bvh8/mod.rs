@@ -11,55 +11,83 @@
 //!
 //! Cost: build O(n log n) and refit O(n) on the current rayon pool; a block takes 160 bytes. Choose it for rays.
 
+mod format;
+mod full;
 mod kernel;
 mod node;
 mod packet;
 mod stream;
+mod tree;
 mod validate;
 
 use super::{
-    Accel, AccelConfig, AccelStats, BuildError, Closest, Counter, HitSink, Refit, TravRay, Violation,
-    block::TriBlock,
-    check_indices,
-    lineage::{self, Lineage, Refittable},
-    sah,
-    topology::{self, Child, Cut, wide::collapse},
-    wide::{
-        Place, Tree, WIDTH, coherent, packet as wide_packet,
-        refit::{Store, Subtree},
-    },
+    Accel, AccelConfig, AccelStats, BuildError, Closest, Counter, HitSink, Refit, TravRay, Violation, sah,
+    topology::{self, Cut},
 };
 use crate::{
     geom::{Aabb, Forms, Hit, Ray, Triangles},
     simd::Simd,
 };
-use node::{Link, MAX_BLOCKS, Node};
-use stream::{ClosestApart, OccludedApart};
+pub(super) use full::Full;
+pub(super) use tree::Tree8;
 
 /// A built hierarchy.
 #[derive(Debug)]
-pub struct Bvh8 {
-    nodes: Vec<Node>,
-    blocks: Vec<TriBlock>,
-    bounds: Aabb,
-    /// Greatest absolute coordinate of the bounds.
-    reach: f32,
-    lineage: Lineage,
-    /// Sums of half areas: of nodes and leaves times the cost of a visit, and of the triangles' own boxes.
-    cost: f64,
-    own_area: f64,
+pub struct Bvh8(Form);
+
+/// The trees of the layouts.
+#[derive(Debug)]
+enum Form {
+    Full(Tree8<Full>),
+}
+
+/// One expression for the tree of any layout.
+macro_rules! of_form {
+    ($form:expr, $tree:ident => $value:expr) => {
+        match $form {
+            Form::Full($tree) => $value,
+        }
+    };
 }
 
 impl Clone for Bvh8 {
     fn clone(&self) -> Self {
-        Self { nodes: self.nodes.clone(), blocks: self.blocks.clone(), ..*self }
+        Self(match &self.0 {
+            Form::Full(tree) => Form::Full(tree.clone()),
+        })
     }
 
     fn clone_from(&mut self, source: &Self) {
-        let (mut nodes, mut blocks) = (std::mem::take(&mut self.nodes), std::mem::take(&mut self.blocks));
-        nodes.clone_from(&source.nodes);
-        blocks.clone_from(&source.blocks);
-        *self = Self { nodes, blocks, ..*source };
+        match (&mut self.0, &source.0) {
+            (Form::Full(tree), Form::Full(source)) => tree.clone_from(source),
+        }
+    }
+}
+
+impl Bvh8 {
+    /// The tree whose blocks hold corners, if it is one.
+    #[inline(always)]
+    pub(super) fn full(&self) -> Option<&Tree8<Full>> {
+        match &self.0 {
+            Form::Full(tree) => Some(tree),
+        }
+    }
+}
+
+/// How boxes and triangles are kept.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Layout {
+    /// Boxes as they are, triangles by their corners.
+    #[default]
+    Full,
+}
+
+impl Layout {
+    fn parse(value: &str) -> Result<Self, String> {
+        match value {
+            "full" => Ok(Self::Full),
+            _ => Err(format!("`{value}` is not one of full, compact")),
+        }
     }
 }
 
@@ -72,125 +100,27 @@ pub struct Bvh8Config {
     pub bins: usize,
     /// Most triangles in a leaf, 1 to 32; leaves take whole blocks of four.
     pub leaf: usize,
+    /// How boxes and triangles are kept.
+    pub layout: Layout,
 }
 
 impl Default for Bvh8Config {
     fn default() -> Self {
-        Self { build: Cut::Sah, bins: 16, leaf: sah::BLOCK }
+        Self { build: Cut::Sah, bins: 16, leaf: sah::BLOCK, layout: Layout::Full }
     }
 }
 
 impl AccelConfig for Bvh8Config {
-    const KEYS: &'static [&'static str] = &["build", "bins", "leaf"];
+    const KEYS: &'static [&'static str] = &["build", "bins", "leaf", "layout"];
 
     fn set(&mut self, key: &str, value: &str) -> Result<(), String> {
         match key {
             "build" => self.build = topology::parse_cut(value)?,
             "bins" => self.bins = topology::parse_bins(value)?,
-            _ => self.leaf = topology::parse_leaf(value)?,
+            "leaf" => self.leaf = topology::parse_leaf(value)?,
+            _ => self.layout = Layout::parse(value)?,
         }
         Ok(())
-    }
-}
-
-impl Tree for Bvh8 {
-    type Node = Node;
-
-    #[inline(always)]
-    fn reach(&self) -> f32 {
-        self.reach
-    }
-
-    #[inline(always)]
-    fn node(&self, number: usize) -> &Node {
-        &self.nodes[number]
-    }
-
-    #[inline(always)]
-    fn blocks(&self) -> &[TriBlock] {
-        &self.blocks
-    }
-
-    #[inline(always)]
-    fn leaf_blocks<C: Counter>(&self, link: Link, count: &mut C) -> &[TriBlock] {
-        let blocks = &self.blocks[link.blocks()];
-        for block in blocks {
-            block.prims().for_each(|_| count.prim());
-        }
-        blocks
-    }
-}
-
-/// Boxes go into the nodes.
-#[derive(Clone, Copy)]
-struct IntoNodes;
-
-impl Store<Node> for IntoNodes {
-    #[inline(always)]
-    fn store(&mut self, _number: usize, aabbs: &[Aabb; WIDTH], node: &mut Node) {
-        node.set_aabbs(aabbs);
-    }
-
-    fn split(self, _number: usize) -> (Self, Self) {
-        (self, self)
-    }
-}
-
-impl Bvh8 {
-    /// Makes blocks and nodes over a wide topology.
-    fn emit(&mut self, topology: &[[Child; WIDTH]], order: &[u32]) {
-        let link =
-            |child: &Child| if let Child::Inner(node) = *child { Link::inner(node as usize) } else { Link::NONE };
-        self.nodes.extend(topology.iter().map(|children| Node::new(children.each_ref().map(link))));
-        self.number_blocks(topology, order, 0);
-    }
-
-    /// Makes the blocks of all leaves below a node, depth first.
-    fn number_blocks(&mut self, topology: &[[Child; WIDTH]], order: &[u32], number: usize) {
-        for (slot, child) in topology[number].iter().enumerate() {
-            match *child {
-                Child::None => {}
-                Child::Inner(below) => self.number_blocks(topology, order, below as usize),
-                Child::Leaf { first, count } => {
-                    let place = self.blocks.len();
-                    self.blocks.extend(TriBlock::of(&order[first as usize..][..count as usize]));
-                    self.nodes[number].links[slot] = Link::leaf(place, self.blocks.len() - place);
-                }
-            }
-        }
-    }
-
-    fn take_positions(&mut self, prims: &Triangles<'_>) {
-        let Self { nodes, blocks, .. } = self;
-        let all = Subtree { nodes, blocks, first_node: 0, first_block: 0, store: IntoNodes, span: Link::span };
-        let swept = all.refit(prims);
-        (self.cost, self.own_area, self.bounds) = (swept.cost, swept.own_area, swept.aabb);
-        self.reach = self.bounds.reach();
-    }
-
-    /// Expected cost of a ray, in units of the triangles' own area. The root's area, which an explosion makes grow as
-    /// well, does not enter.
-    fn relative_cost(&self) -> f64 {
-        if self.own_area > 0.0 { self.cost / self.own_area } else { 0.0 }
-    }
-
-    fn depth(&self) -> usize {
-        let mut depths = vec![0_usize; self.nodes.len()];
-        for (i, node) in self.nodes.iter().enumerate().rev() {
-            let below = node.links.iter().map(|l| if l.is_leaf() { 1 } else { depths[l.index()] });
-            depths[i] = 1 + below.max().unwrap_or(0);
-        }
-        depths[0]
-    }
-}
-
-impl Refittable for Bvh8 {
-    fn lineage(&self) -> &Lineage {
-        &self.lineage
-    }
-
-    fn retake(&mut self, prims: &Triangles<'_>) {
-        self.take_positions(prims);
     }
 }
 
@@ -200,49 +130,42 @@ impl Accel for Bvh8 {
     type RayState = ();
 
     fn build(prims: &Triangles<'_>, config: &Bvh8Config) -> Result<Self, BuildError> {
-        check_indices(Self::NAME, prims, MAX_BLOCKS)?;
-        let settings = topology::Settings { cut: config.build, bins: config.bins, leaf: config.leaf };
-        let binary = topology::build(prims, &settings);
-        let mut out = Self {
-            nodes: Vec::new(),
-            blocks: Vec::new(),
-            bounds: Aabb::EMPTY,
-            reach: 0.0,
-            lineage: Lineage::new(prims),
-            cost: 0.0,
-            own_area: 0.0,
-        };
-        out.emit(&collapse(&binary, prims), &binary.prims);
-        out.take_positions(prims);
-        out.lineage.set_fresh_cost(out.relative_cost());
-        Ok(out)
+        Ok(Self(match config.layout {
+            Layout::Full => Form::Full(Tree8::build(prims, config)?),
+        }))
     }
 
     fn refit_into(&self, out: &mut Self, prims: &Triangles<'_>) -> Refit {
-        lineage::refit_into(self, out, prims)
+        match (&self.0, &mut out.0) {
+            (Form::Full(tree), Form::Full(out)) => tree.refit_into(out, prims),
+        }
+    }
+
+    fn node_format(&self) -> &'static str {
+        of_form!(&self.0, tree => tree.node_format())
     }
 
     #[inline(always)]
     fn closest<S: Simd, C: Counter, K: HitSink>(
         &self,
-        _prims: &Triangles<'_>,
+        prims: &Triangles<'_>,
         ray: &TravRay,
         best: &mut Closest,
         sink: &K,
         count: &mut C,
     ) {
-        self.walk_closest::<S, C, K>(ray, best, sink, count);
+        of_form!(&self.0, tree => tree.closest::<S, C, K>(prims, ray, best, sink, count));
     }
 
     #[inline(always)]
     fn occluded<S: Simd, C: Counter, K: HitSink>(
         &self,
-        _prims: &Triangles<'_>,
+        prims: &Triangles<'_>,
         ray: &TravRay,
         sink: &K,
         count: &mut C,
     ) -> bool {
-        self.walk_occluded::<S, C, K>(ray, sink, count)
+        of_form!(&self.0, tree => tree.occluded::<S, C, K>(prims, ray, sink, count))
     }
 
     #[inline(always)]
@@ -254,13 +177,7 @@ impl Accel for Bvh8 {
         forms: Forms,
         out: &mut [Option<Hit>],
     ) {
-        if packet == 1 {
-            S::call(ClosestApart { tree: self, prims, rays, forms, out });
-        } else {
-            let apart =
-                |rays: &[Ray], out: &mut [Option<Hit>]| S::call(ClosestApart { tree: self, prims, rays, forms, out });
-            coherent::closest::<S, Self>(self, prims, (rays, packet), forms, out, apart);
-        }
+        of_form!(&self.0, tree => tree.closest_all::<S>(prims, rays, packet, forms, out));
     }
 
     #[inline(always)]
@@ -272,12 +189,7 @@ impl Accel for Bvh8 {
         forms: Forms,
         out: &mut [bool],
     ) {
-        if packet == 1 {
-            S::call(OccludedApart { tree: self, prims, rays, forms, out });
-        } else {
-            let apart = |rays: &[Ray], out: &mut [bool]| S::call(OccludedApart { tree: self, prims, rays, forms, out });
-            coherent::occluded::<S, Self>(self, prims, (rays, packet), forms, out, apart);
-        }
+        of_form!(&self.0, tree => tree.occluded_all::<S>(prims, rays, packet, forms, out));
     }
 
     #[inline(always)]
@@ -290,7 +202,7 @@ impl Accel for Bvh8 {
         sinks: &[K],
         count: &mut C,
     ) {
-        wide_packet::closest_packet::<S, Self, C, K>(self, prims, rays, active, best, sinks, count);
+        of_form!(&self.0, tree => tree.closest_packet::<S, C, K>(prims, rays, active, best, sinks, count));
     }
 
     #[inline(always)]
@@ -302,33 +214,23 @@ impl Accel for Bvh8 {
         sinks: &[K],
         count: &mut C,
     ) -> u32 {
-        wide_packet::occluded_packet::<S, Self, C, K>(self, prims, rays, active, sinks, count)
+        of_form!(&self.0, tree => tree.occluded_packet::<S, C, K>(prims, rays, active, sinks, count))
     }
 
     fn validate(&self, prims: &Triangles<'_>) -> Result<(), Violation> {
-        validate::validate(self, prims).map_err(Violation)
+        of_form!(&self.0, tree => tree.validate(prims))
     }
 
     fn stats(&self) -> AccelStats {
-        let leaves = self.nodes.iter().flat_map(|n| n.links).filter(|l| l.is_leaf() && !l.is_none()).count();
-        let node_bytes = size_of_val(&self.nodes[..]);
-        let root = sah::half_area(self.bounds);
-        AccelStats {
-            nodes: self.nodes.len() + leaves,
-            leaves,
-            depth: self.depth(),
-            node_bytes,
-            total_bytes: size_of::<Self>() + node_bytes + size_of_val(&self.blocks[..]),
-            sah_cost: sah::COST_TRAVERSE + if root > 0.0 { self.cost / root } else { 0.0 },
-        }
+        of_form!(&self.0, tree => tree.stats())
     }
 
     fn bounds(&self) -> Aabb {
-        self.bounds
+        of_form!(&self.0, tree => tree.bounds())
     }
 
     fn decay(&self) -> f64 {
-        self.lineage.decay(self.relative_cost())
+        of_form!(&self.0, tree => tree.decay())
     }
 }
 

@@ -1,6 +1,6 @@
 #![expect(clippy::cast_possible_truncation, reason = "the builder keeps the numbers of nodes and blocks below 2^28")]
 
-use std::ops::Range;
+use std::{fmt::Debug, ops::Range};
 
 use glam::Vec3;
 
@@ -11,7 +11,7 @@ use crate::{
         wide::{Place, WIDTH, WideNode},
     },
     geom::Aabb,
-    simd::branch_barrier,
+    simd::{Lanes, Simd, branch_barrier},
 };
 
 /// Blocks that one leaf may hold.
@@ -108,6 +108,24 @@ pub(in crate::accel) struct Node {
 
 const _: () = assert!(size_of::<Node>() == 224);
 
+/// A node of any layout: eight boxes, each plane of which is a number of f32.
+pub(in crate::accel) trait EightNode: WideNode<Word = Link> + Clone + Debug + 'static {
+    /// Children whose boxes are still to be set.
+    fn new(links: [Link; WIDTH]) -> Self;
+    /// The lower (0) or upper (1) planes of the children on an axis.
+    fn planes<S: Simd>(&self, axis: usize, side: usize) -> S::F8;
+    /// One of them.
+    fn plane(&self, axis: usize, side: usize, child: usize) -> f32;
+    /// Bits of the children that the planes speak for; others are not there whatever the planes say.
+    fn present(&self) -> u32;
+    /// The children.
+    fn links(&self) -> &[Link; WIDTH];
+    /// Sets one of the children.
+    fn set_link(&mut self, child: usize, link: Link);
+    /// What is wrong with the planes when these are the children's boxes.
+    fn check(&self, aabbs: &[Aabb; WIDTH]) -> Result<(), String>;
+}
+
 impl WideNode for Node {
     type Word = Link;
 
@@ -117,14 +135,49 @@ impl WideNode for Node {
     }
 }
 
-impl Node {
-    /// Children whose boxes are still to be set.
-    pub(super) fn new(links: [Link; WIDTH]) -> Self {
+impl EightNode for Node {
+    fn new(links: [Link; WIDTH]) -> Self {
         Self { planes: [[[f32::INFINITY; WIDTH], [f32::NEG_INFINITY; WIDTH]]; 3], links }
     }
 
     #[inline(always)]
-    pub(super) fn aabb(&self, child: usize) -> Aabb {
+    fn planes<S: Simd>(&self, axis: usize, side: usize) -> S::F8 {
+        S::F8::load(&self.planes[axis][side])
+    }
+
+    #[inline(always)]
+    fn plane(&self, axis: usize, side: usize, child: usize) -> f32 {
+        self.planes[axis][side][child]
+    }
+
+    #[inline(always)]
+    fn present(&self) -> u32 {
+        u32::MAX
+    }
+
+    #[inline(always)]
+    fn links(&self) -> &[Link; WIDTH] {
+        &self.links
+    }
+
+    fn set_link(&mut self, child: usize, link: Link) {
+        self.links[child] = link;
+    }
+
+    fn check(&self, aabbs: &[Aabb; WIDTH]) -> Result<(), String> {
+        for (child, &due) in aabbs.iter().enumerate() {
+            let stored = self.aabb(child);
+            if stored != due && !(stored.is_empty() && due.is_empty()) {
+                return Err(format!("child {child}: box {stored:?}, due {due:?}"));
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Node {
+    #[inline(always)]
+    fn aabb(&self, child: usize) -> Aabb {
         let [x, y, z] = &self.planes;
         Aabb {
             min: Vec3::new(x[0][child], y[0][child], z[0][child]),

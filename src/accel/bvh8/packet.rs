@@ -1,9 +1,10 @@
 //! Rays of common direction signs against eight boxes.
 
 use super::{
-    Bvh8,
+    format::Format,
     kernel::{ClosestFrom, OccludedFrom},
-    node::{Link, Node},
+    node::{EightNode, Link},
+    tree::Tree8,
 };
 use crate::{
     accel::{
@@ -18,6 +19,7 @@ use crate::{
             walk,
         },
     },
+    geom::Triangles,
     simd::{Lanes, Simd},
 };
 
@@ -67,7 +69,7 @@ impl<S: Simd> Packet<S> {
     }
 }
 
-impl<S: Simd> Together<S, Bvh8> for Packet<S> {
+impl<S: Simd, F: Format> Together<S, Tree8<F>> for Packet<S> {
     type Mark = ();
     type Kids = [f32; WIDTH];
     type Rays = S::F;
@@ -78,16 +80,16 @@ impl<S: Simd> Together<S, Bvh8> for Packet<S> {
     }
 
     #[inline(always)]
-    fn all(&self, node: &Node, _mark: (), entries: &mut [f32; WIDTH]) -> u32 {
+    fn all(&self, node: &F::Node, _mark: (), entries: &mut [f32; WIDTH]) -> u32 {
         let (mut near, mut far) = (self.all_near, self.all_far);
         for axis in 0..3 {
             let (side, [entry, exit]) = (self.backward[axis] & 1, &self.ends[axis]);
-            let (first, last) = (S::F8::load(&node.planes[axis][side]), S::F8::load(&node.planes[axis][side ^ 1]));
+            let (first, last) = (node.planes::<S>(axis, side), node.planes::<S>(axis, side ^ 1));
             near = ((first - entry.origin) * entry.inv).max(near);
             far = ((last - exit.origin) * exit.inv).min(far);
         }
         near.store(entries);
-        near.le(far.mul_add_loose(S::F8::splat(GROW), S::F8::splat(SLACK)))
+        near.le(far.mul_add_loose(S::F8::splat(GROW), S::F8::splat(SLACK))) & node.present()
     }
 
     #[inline(always)]
@@ -99,11 +101,11 @@ impl<S: Simd> Together<S, Bvh8> for Packet<S> {
     }
 
     #[inline(always)]
-    fn each(&self, node: &Node, slot: usize, _near: &S::F) -> (u32, S::F) {
+    fn each(&self, node: &F::Node, slot: usize, _near: &S::F) -> (u32, S::F) {
         let (mut near, mut far) = (self.near, self.limit);
         for axis in 0..3 {
             let (side, slab) = (self.backward[axis] & 1, &self.slabs[axis]);
-            let (first, last) = (node.planes[axis][side][slot], node.planes[axis][side ^ 1][slot]);
+            let (first, last) = (node.plane(axis, side, slot), node.plane(axis, side ^ 1, slot));
             near = S::F::splat(first).mul_add_loose(slab.entry_mul, slab.entry_add).max(near);
             far = S::F::splat(last).mul_add_loose(slab.exit_mul, slab.exit_add).min(far);
         }
@@ -128,9 +130,9 @@ impl<S: Simd> Together<S, Bvh8> for Packet<S> {
 
     #[inline(always)]
     fn closest_below<C: Counter, K: HitSink>(
-        tree: &Bvh8,
+        tree: &Tree8<F>,
         (start, _, _): (Link, &S::F, usize),
-        ray: &TravRay,
+        ray: (&TravRay, &Triangles<'_>),
         best: &mut Closest,
         sink: &K,
         count: &mut C,
@@ -140,9 +142,9 @@ impl<S: Simd> Together<S, Bvh8> for Packet<S> {
 
     #[inline(always)]
     fn occluded_below<C: Counter, K: HitSink>(
-        tree: &Bvh8,
+        tree: &Tree8<F>,
         (start, _, _): (Link, &S::F, usize),
-        ray: &TravRay,
+        ray: (&TravRay, &Triangles<'_>),
         sink: &K,
         count: &mut C,
     ) -> bool {
@@ -150,7 +152,7 @@ impl<S: Simd> Together<S, Bvh8> for Packet<S> {
     }
 }
 
-impl PacketTree for Bvh8 {
+impl<F: Format> PacketTree for Tree8<F> {
     type Packet<S: Simd> = Packet<S>;
 
     #[inline(always)]
@@ -164,7 +166,7 @@ impl PacketTree for Bvh8 {
 /// The children of a node that a packet of equal rays meets: as a whole, and the rays one by one.
 #[cfg(test)]
 #[inline(always)]
-pub(super) fn met_together<S: Simd>(ray: &TravRay, node: &Node, reach: f32) -> [u32; 2] {
+pub(super) fn met_together<S: Simd, F: Format>(ray: &TravRay, node: &F::Node, reach: f32) -> [u32; 2] {
     let rays = [*ray; 3];
     let dir = ray.range().dir;
     let signs = [dir.x < 0.0, dir.y < 0.0, dir.z < 0.0];
@@ -172,12 +174,12 @@ pub(super) fn met_together<S: Simd>(ray: &TravRay, node: &Node, reach: f32) -> [
     packet.prepare::<S>(crate::geom::Precision::Exact);
     let together = Packet::<S>::new(&packet, (7, signs));
     let mut entries = [0.0; WIDTH];
-    let all = together.all(node, (), &mut entries);
+    let all = Together::<S, Tree8<F>>::all(&together, node, (), &mut entries) & 0xff;
     let mut each = 0;
     for slot in 0..WIDTH {
-        let hits = together.each(node, slot, &together.near).0 & 7;
+        let hits = Together::<S, Tree8<F>>::each(&together, node, slot, &together.near).0 & 7;
         assert!(hits == 0 || hits == 7, "{hits:b}");
         each |= (hits & 1) << slot;
     }
-    [all, each]
+    [all, each & node.present()]
 }

@@ -5,9 +5,10 @@
 //! the next step takes the last. Rays are prepared and their hits are rounded a vector at a time.
 
 use super::{
-    Bvh8,
+    full::Full,
     kernel::{Boxes, MAX_STACK},
     node::Link,
+    tree::Tree8,
 };
 use crate::{
     accel::{
@@ -45,7 +46,7 @@ impl Wing {
     const EMPTY: Self = Self { rays: PacketRays::EMPTY, nearest: Nearest::NONE, taken: 0, blocked: 0 };
 
     #[inline(always)]
-    fn load<S: Simd>(&mut self, tree: &Bvh8, rays: &[Ray], forms: Forms) {
+    fn load<S: Simd>(&mut self, tree: &Tree8<Full>, rays: &[Ray], forms: Forms) {
         self.taken = self.rays.load::<S>(rays, tree.reach, forms);
         self.rays.bound::<S>();
         self.rays.prepare::<S>(forms.nodes);
@@ -77,11 +78,11 @@ impl Flight {
         self.boxes.take(&from.rays, lane % PACKET);
         (self.wing, self.lane) = (wing, lane);
         self.len = 1;
-        (self.keys[0], self.links[0]) = (LEAST_KEY, Bvh8::root().bits());
+        (self.keys[0], self.links[0]) = (LEAST_KEY, Tree8::<Full>::root().bits());
     }
 
     #[inline(always)]
-    fn closest_step<S: Simd>(&mut self, tree: &Bvh8, wings: &mut [Wing; WINGS]) {
+    fn closest_step<S: Simd>(&mut self, tree: &Tree8<Full>, wings: &mut [Wing; WINGS]) {
         self.len -= 1;
         let (key, link) = (self.keys[self.len], Link::from_bits(self.links[self.len]));
         if !self.boxes.reaches(key_floor(key)) {
@@ -102,7 +103,7 @@ impl Flight {
 
     /// True when the ray is blocked.
     #[inline(always)]
-    fn occluded_step<S: Simd>(&mut self, tree: &Bvh8, wings: &[Wing; WINGS]) -> bool {
+    fn occluded_step<S: Simd>(&mut self, tree: &Tree8<Full>, wings: &[Wing; WINGS]) -> bool {
         self.len -= 1;
         let link = Link::from_bits(self.links[self.len]);
         if link.is_leaf() {
@@ -118,7 +119,7 @@ impl Flight {
 }
 
 struct ClosestLeaf<'a> {
-    tree: &'a Bvh8,
+    tree: &'a Tree8<Full>,
     link: Link,
     wing: &'a mut Wing,
     lane: usize,
@@ -131,13 +132,13 @@ impl Task for ClosestLeaf<'_> {
     fn run<S: Simd>(self) {
         let Self { tree, link, wing, lane } = self;
         for number in link.blocks() {
-            wing.nearest.offer_one::<S, _>(&mut wing.rays, (&tree.blocks, number), lane, &AnyHit);
+            wing.nearest.offer_one::<S, _>(&mut wing.rays, (&tree.items, number), lane, &AnyHit);
         }
     }
 }
 
 struct OccludedLeaf<'a> {
-    tree: &'a Bvh8,
+    tree: &'a Tree8<Full>,
     link: Link,
     rays: &'a PacketRays,
     lane: usize,
@@ -150,7 +151,7 @@ impl Task for OccludedLeaf<'_> {
     fn run<S: Simd>(self) -> bool {
         let Self { tree, link, rays, lane } = self;
         for number in link.blocks() {
-            if tree.blocks[number].blocks_one::<S>(rays, lane) {
+            if tree.items[number].blocks_one::<S>(rays, lane) {
                 return true;
             }
         }
@@ -184,7 +185,7 @@ impl Waiting {
 /// Flies all rays of the wings in use: to their closest hits, or to any.
 #[inline(always)]
 fn fly<S: Simd, const ANY: bool>(
-    tree: &Bvh8,
+    tree: &Tree8<Full>,
     wings: &mut [Wing; WINGS],
     used: usize,
     flights: &mut [Flight; IN_FLIGHT],
@@ -225,7 +226,7 @@ fn fly<S: Simd, const ANY: bool>(
 
 /// Prepares the rays, at most as many as the wings hold: the number of wings in use.
 #[inline(always)]
-fn load<S: Simd>(wings: &mut [Wing; WINGS], tree: &Bvh8, rays: &[Ray], forms: Forms) -> usize {
+fn load<S: Simd>(wings: &mut [Wing; WINGS], tree: &Tree8<Full>, rays: &[Ray], forms: Forms) -> usize {
     let mut used = 0;
     for (wing, rays) in wings.iter_mut().zip(rays.chunks(S::F::LEN)) {
         wing.load::<S>(tree, rays, forms);
@@ -236,7 +237,7 @@ fn load<S: Simd>(wings: &mut [Wing; WINGS], tree: &Bvh8, rays: &[Ray], forms: Fo
 
 /// The closest hit of every ray.
 pub(super) struct ClosestApart<'a> {
-    pub(super) tree: &'a Bvh8,
+    pub(super) tree: &'a Tree8<Full>,
     pub(super) prims: &'a Triangles<'a>,
     pub(super) rays: &'a [Ray],
     pub(super) forms: Forms,
@@ -256,9 +257,9 @@ impl Task for ClosestApart<'_> {
             let used = load::<S>(&mut wings, tree, rays, forms);
             fly::<S, false>(tree, &mut wings, used, &mut flights);
             for ((wing, rays), out) in wings.iter().zip(rays.chunks(S::F::LEN)).zip(out.chunks_mut(S::F::LEN)) {
-                wing.nearest.answer::<S, _>(&wing.rays, &tree.blocks, &AnyHit, out);
+                wing.nearest.answer::<S, _>(&wing.rays, &tree.items, &AnyHit, out);
                 for i in bits(!wing.taken & (u32::MAX >> (32 - rays.len()))) {
-                    out[i] = run::closest_one::<S, Bvh8>(tree, prims, &rays[i], forms);
+                    out[i] = run::closest_one::<S, Tree8<Full>>(tree, prims, &rays[i], forms);
                 }
             }
         }
@@ -267,7 +268,7 @@ impl Task for ClosestApart<'_> {
 
 /// Whether every ray is blocked.
 pub(super) struct OccludedApart<'a> {
-    pub(super) tree: &'a Bvh8,
+    pub(super) tree: &'a Tree8<Full>,
     pub(super) prims: &'a Triangles<'a>,
     pub(super) rays: &'a [Ray],
     pub(super) forms: Forms,
@@ -291,7 +292,7 @@ impl Task for OccludedApart<'_> {
                     *out = wing.blocked >> i & 1 == 1;
                 }
                 for i in bits(!wing.taken & (u32::MAX >> (32 - rays.len()))) {
-                    out[i] = run::occluded_one::<S, Bvh8>(tree, prims, &rays[i], forms);
+                    out[i] = run::occluded_one::<S, Tree8<Full>>(tree, prims, &rays[i], forms);
                 }
             }
         }

@@ -3,8 +3,9 @@ use proptest::prelude::*;
 
 use super::{
     Bvh8, Bvh8Config,
+    full::Full,
     kernel::met,
-    node::{Link, Node},
+    node::{EightNode, Link, Node},
     packet::met_together,
 };
 use crate::{
@@ -25,8 +26,8 @@ impl Task for Met<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self) -> [u32; 4] {
-        let [fast, wide] = met::<S>(self.ray, self.node, self.reach);
-        let [all, each] = met_together::<S>(self.ray, self.node, self.reach);
+        let [fast, wide] = met::<S, Full>(self.ray, self.node, self.reach);
+        let [all, each] = met_together::<S, Full>(self.ray, self.node, self.reach);
         [fast, wide, all, each]
     }
 }

@@ -4,6 +4,7 @@ use super::{Nearest, PacketRays, Spread};
 use crate::{
     accel::{
         AnyAccel, HitSink,
+        bvh8::{Full, Tree8},
         query::SLACK,
         run::{ClosestLanes, OccludedLanes},
     },
@@ -65,20 +66,25 @@ impl LanePacket {
 impl AnyAccel {
     /// True for structures that [`AnyAccel::closest_lanes`] and [`AnyAccel::occluded_lanes`] may be asked of.
     pub(crate) fn takes_lanes(&self) -> bool {
-        matches!(self, Self::Bvh8(_))
+        self.by_lane().is_some()
+    }
+
+    #[inline(always)]
+    fn by_lane(&self) -> Option<&Tree8<Full>> {
+        if let Self::Bvh8(tree) = self { tree.full() } else { None }
     }
 
     /// Offers the triangles to the rays in `open`, all hits of which `sink` accepts. Panics where [`AnyAccel::takes_lanes`] is false.
     #[inline(always)]
     pub(crate) fn closest_lanes<S: Simd, K: HitSink>(&self, packet: &mut LanePacket, open: u32, sink: &K) {
-        let Self::Bvh8(tree) = self else { unreachable!("only bvh8 takes rays by lane") };
+        let Some(tree) = self.by_lane() else { unreachable!("only bvh8's full layout takes rays by lane") };
         S::call(ClosestLanes { tree, packet, open, sink });
     }
 
     /// The rays in `open` that something blocks. Panics as above.
     #[inline(always)]
     pub(crate) fn occluded_lanes<S: Simd>(&self, packet: &mut LanePacket, open: u32) -> u32 {
-        let Self::Bvh8(tree) = self else { unreachable!("only bvh8 takes rays by lane") };
+        let Some(tree) = self.by_lane() else { unreachable!("only bvh8's full layout takes rays by lane") };
         S::call(OccludedLanes { tree, packet, open })
     }
 }

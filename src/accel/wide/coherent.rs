@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::{
     Place,
-    packet::{Entry, PacketTree, Stack, Together, descend},
+    packet::{BlockTree, Entry, Stack, Together, descend},
 };
 use crate::{
     accel::{
@@ -79,7 +79,7 @@ impl<'a> Packets<'a> {
 
 /// As [`Accel::closest_all`](crate::accel::Accel::closest_all), each `width` rays together; `apart` answers runs of those that point apart.
 #[inline(always)]
-pub(in crate::accel) fn closest<S: Simd, T: PacketTree>(
+pub(in crate::accel) fn closest<S: Simd, T: BlockTree>(
     tree: &T,
     prims: &Triangles<'_>,
     (rays, width): (&[Ray], usize),
@@ -109,7 +109,7 @@ pub(in crate::accel) fn closest<S: Simd, T: PacketTree>(
 
 /// As [`Accel::occluded_all`](crate::accel::Accel::occluded_all), each `width` rays together; `apart` answers runs of those that point apart.
 #[inline(always)]
-pub(in crate::accel) fn occluded<S: Simd, T: PacketTree>(
+pub(in crate::accel) fn occluded<S: Simd, T: BlockTree>(
     tree: &T,
     prims: &Triangles<'_>,
     (rays, width): (&[Ray], usize),
@@ -140,7 +140,7 @@ pub(in crate::accel) fn occluded<S: Simd, T: PacketTree>(
 
 /// Offers the triangles of a tree to the prepared rays in `left`.
 #[inline(always)]
-pub(in crate::accel) fn closest_in<S: Simd, T: PacketTree, K: HitSink>(
+pub(in crate::accel) fn closest_in<S: Simd, T: BlockTree, K: HitSink>(
     tree: &T,
     lines: &mut PacketRays,
     mut left: u32,
@@ -160,7 +160,7 @@ pub(in crate::accel) fn closest_in<S: Simd, T: PacketTree, K: HitSink>(
 
 /// The prepared rays in `left` that something of a tree blocks.
 #[inline(always)]
-pub(in crate::accel) fn occluded_in<S: Simd, T: PacketTree>(
+pub(in crate::accel) fn occluded_in<S: Simd, T: BlockTree>(
     tree: &T,
     lines: &PacketRays,
     mut left: u32,
@@ -180,7 +180,7 @@ pub(in crate::accel) fn occluded_in<S: Simd, T: PacketTree>(
 
 /// Offers the triangles below a node to the rays of a packet.
 #[inline(always)]
-fn closest_below<S: Simd, T: PacketTree, P: Together<S, T>, K: HitSink>(
+fn closest_below<S: Simd, T: BlockTree, P: Together<S, T>, K: HitSink>(
     tree: &T,
     mut together: P,
     start: Entry<S, T, P>,
@@ -198,7 +198,7 @@ fn closest_below<S: Simd, T: PacketTree, P: Together<S, T>, K: HitSink>(
             continue;
         }
         if entry.word.is_leaf() {
-            let blocks = tree.leaf_blocks(entry.word, &mut ());
+            let blocks = tree.leaf_blocks(entry.word);
             for (number, block) in (entry.word.index()..).zip(blocks) {
                 let mask = mask & together.meeting(block, &entry.rays);
                 if mask != 0 {
@@ -214,7 +214,7 @@ fn closest_below<S: Simd, T: PacketTree, P: Together<S, T>, K: HitSink>(
 
 /// The rays of the start that something blocks.
 #[inline(always)]
-fn occluded_below<S: Simd, T: PacketTree, P: Together<S, T>>(
+fn occluded_below<S: Simd, T: BlockTree, P: Together<S, T>>(
     tree: &T,
     together: &P,
     start: Entry<S, T, P>,
@@ -232,7 +232,7 @@ fn occluded_below<S: Simd, T: PacketTree, P: Together<S, T>>(
             continue;
         }
         if entry.word.is_leaf() {
-            for block in tree.leaf_blocks(entry.word, &mut ()) {
+            for block in tree.leaf_blocks(entry.word) {
                 let mask = mask & open & together.meeting(block, &entry.rays);
                 if mask != 0 {
                     open &= !block.blocked::<S>(lines, mask, tri);

@@ -7,10 +7,11 @@ pub(super) mod walk;
 
 pub(super) use super::topology::wide::WIDTH;
 use super::{Counter, block::TriBlock};
+use crate::geom::Triangles;
 
-/// A tree of eight children a node over blocks of triangles.
+/// A tree of eight children a node over triangles in blocks.
 ///
-/// Nodes and blocks stand depth first, in the order of the children, so that a subtree owns a contiguous run of each.
+/// Nodes and leaves stand depth first, in the order of the children, so that a subtree owns a contiguous run of each.
 pub(super) trait Tree {
     /// A node.
     type Node: WideNode;
@@ -19,10 +20,16 @@ pub(super) trait Tree {
     fn reach(&self) -> f32;
     /// A node by its number.
     fn node(&self, number: usize) -> &Self::Node;
-    /// The blocks of all leaves.
-    fn blocks(&self) -> &[TriBlock];
-    /// Blocks of a leaf that has some; its triangles are counted.
-    fn leaf_blocks<C: Counter>(&self, word: Word<Self>, count: &mut C) -> &[TriBlock];
+    /// How many blocks a leaf has.
+    fn span(&self, word: Word<Self>) -> usize;
+    /// One of the blocks of a leaf, its triangles counted. `room` is for trees that make it of the triangles given.
+    fn block<'a, C: Counter>(
+        &'a self,
+        place: (Word<Self>, usize),
+        prims: &Triangles<'_>,
+        room: &'a mut TriBlock,
+        count: &mut C,
+    ) -> &'a TriBlock;
 }
 
 /// The word of a child in a tree's nodes.

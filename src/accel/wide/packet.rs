@@ -48,7 +48,7 @@ pub(in crate::accel) trait Together<S: Simd, T: Tree> {
     fn closest_below<C: Counter, H: HitSink>(
         tree: &T,
         start: (Word<T>, &Self::Rays, usize),
-        ray: &TravRay,
+        ray: (&TravRay, &Triangles<'_>),
         best: &mut Closest,
         sink: &H,
         count: &mut C,
@@ -57,7 +57,7 @@ pub(in crate::accel) trait Together<S: Simd, T: Tree> {
     fn occluded_below<C: Counter, H: HitSink>(
         tree: &T,
         start: (Word<T>, &Self::Rays, usize),
-        ray: &TravRay,
+        ray: (&TravRay, &Triangles<'_>),
         sink: &H,
         count: &mut C,
     ) -> bool;
@@ -93,6 +93,14 @@ pub(in crate::accel) trait PacketTree: Tree + Accel {
     fn start<S: Simd>(&self, packet: &PacketRays, rays: (u32, [bool; 3])) -> Start<S, Self>;
 }
 
+/// A packet tree that owns its blocks.
+pub(in crate::accel) trait BlockTree: PacketTree {
+    /// The blocks of all leaves.
+    fn blocks(&self) -> &[TriBlock];
+    /// Blocks of a leaf that has some.
+    fn leaf_blocks(&self, word: Word<Self>) -> &[TriBlock];
+}
+
 /// As [`Accel::closest_packet`].
 #[inline(always)]
 pub(in crate::accel) fn closest_packet<S: Simd, T: PacketTree, C: Counter, H: HitSink>(
@@ -120,7 +128,7 @@ pub(in crate::accel) fn closest_packet<S: Simd, T: PacketTree, C: Counter, H: Hi
             }
             let (together, root) = tree.start::<S>(&packet, (members, backward));
             if let Some(root) = root {
-                closest::<S, T, _, C, H>(tree, together, root, rays, &mut packet, (&mut *best, sinks), count);
+                closest::<S, T, _, C, H>(tree, together, root, (rays, prims), &mut packet, (&mut *best, sinks), count);
             }
         }
     }
@@ -150,7 +158,8 @@ pub(in crate::accel) fn occluded_packet<S: Simd, T: PacketTree, C: Counter, H: H
             packet.prepare::<S>(rays[0].forms().nodes);
             let (together, root) = tree.start::<S>(&packet, (members, backward));
             if let Some(root) = root {
-                blocked |= occluded::<S, T, _, C, H>(tree, &together, root, rays, &packet, sinks, count) << start;
+                blocked |=
+                    occluded::<S, T, _, C, H>(tree, &together, root, (rays, prims), &packet, sinks, count) << start;
             }
         }
     }
@@ -199,12 +208,12 @@ fn closest<S: Simd, T: Tree, P: Together<S, T>, C: Counter, H: HitSink>(
     tree: &T,
     mut together: P,
     start: Entry<S, T, P>,
-    rays: &[TravRay],
+    (rays, prims): (&[TravRay], &Triangles<'_>),
     packet: &mut PacketRays,
     (best, sinks): (&mut [Closest], &[H]),
     count: &mut C,
 ) {
-    let mut kids = P::kids();
+    let (mut kids, mut room) = (P::kids(), TriBlock::EMPTY);
     let mut stack = Stack::<S, T, P>::new();
     stack.push(start);
     while let Some(mut entry) = stack.pop() {
@@ -213,7 +222,8 @@ fn closest<S: Simd, T: Tree, P: Together<S, T>, C: Counter, H: HitSink>(
             continue;
         }
         if entry.word.is_leaf() {
-            for block in tree.leaf_blocks(entry.word, count) {
+            for i in 0..tree.span(entry.word) {
+                let block = tree.block((entry.word, i), prims, &mut room, count);
                 let mask = mask & together.meeting(block, &entry.rays);
                 if mask != 0 {
                     block.closest_packet::<S, C, H>(rays, packet, mask, best, sinks, count);
@@ -222,7 +232,7 @@ fn closest<S: Simd, T: Tree, P: Together<S, T>, C: Counter, H: HitSink>(
             together.limit(packet);
         } else if mask.count_ones() <= FEW {
             for i in bits(mask) {
-                P::closest_below(tree, (entry.word, &entry.rays, i), &rays[i], &mut best[i], &sinks[i], count);
+                P::closest_below(tree, (entry.word, &entry.rays, i), (&rays[i], prims), &mut best[i], &sinks[i], count);
                 packet.set_limit(i, &best[i]);
             }
             together.limit(packet);
@@ -239,12 +249,12 @@ fn occluded<S: Simd, T: Tree, P: Together<S, T>, C: Counter, H: HitSink>(
     tree: &T,
     together: &P,
     start: Entry<S, T, P>,
-    rays: &[TravRay],
+    (rays, prims): (&[TravRay], &Triangles<'_>),
     packet: &PacketRays,
     sinks: &[H],
     count: &mut C,
 ) -> u32 {
-    let mut kids = P::kids();
+    let (mut kids, mut room) = (P::kids(), TriBlock::EMPTY);
     let mut stack = Stack::<S, T, P>::new();
     let active = start.mask;
     let mut open = active;
@@ -255,7 +265,8 @@ fn occluded<S: Simd, T: Tree, P: Together<S, T>, C: Counter, H: HitSink>(
             continue;
         }
         if entry.word.is_leaf() {
-            for block in tree.leaf_blocks(entry.word, count) {
+            for i in 0..tree.span(entry.word) {
+                let block = tree.block((entry.word, i), prims, &mut room, count);
                 let mask = mask & open & together.meeting(block, &entry.rays);
                 if mask != 0 {
                     open &= !block.occluded_packet::<S, C, H>(rays, packet, mask, sinks, count);
@@ -266,7 +277,7 @@ fn occluded<S: Simd, T: Tree, P: Together<S, T>, C: Counter, H: HitSink>(
             }
         } else if mask.count_ones() <= FEW {
             for i in bits(mask) {
-                let hit = P::occluded_below(tree, (entry.word, &entry.rays, i), &rays[i], &sinks[i], count);
+                let hit = P::occluded_below(tree, (entry.word, &entry.rays, i), (&rays[i], prims), &sinks[i], count);
                 open &= !(u32::from(hit) << i);
             }
         } else {

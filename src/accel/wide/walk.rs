@@ -9,6 +9,7 @@ use crate::{
         block::{BlockRay, TriBlock},
         topology::MAX_DEPTH,
     },
+    geom::Triangles,
     simd::Simd,
 };
 
@@ -65,17 +66,18 @@ pub(in crate::accel) fn closest<S: Simd, T: Tree, N: Kernel<T>, C: Counter, K: H
     tree: &T,
     mut test: N,
     (mut word, mut mark): (Word<T>, N::Mark),
-    ray: &TravRay,
+    (ray, prims): (&TravRay, &Triangles<'_>),
     best: &mut Closest,
     sink: &K,
     count: &mut C,
 ) {
-    let block_ray = BlockRay::new(ray, tree.reach());
+    let (block_ray, mut room) = (BlockRay::new(ray, tree.reach()), TriBlock::EMPTY);
     let mut stack = Stack::<T, N::Mark>::new();
     let mut kids = N::kids();
     loop {
         if word.is_leaf() {
-            for block in tree.leaf_blocks(word, count) {
+            for i in 0..tree.span(word) {
+                let block = tree.block((word, i), prims, &mut room, count);
                 if test.may_meet::<S>(block, mark) {
                     block.closest::<S, C, K>(ray, &block_ray, best, sink, count);
                 }
@@ -162,16 +164,17 @@ pub(in crate::accel) fn occluded<S: Simd, T: Tree, N: Kernel<T>, C: Counter, K: 
     tree: &T,
     test: &N,
     (mut word, mut mark): (Word<T>, N::Mark),
-    ray: &TravRay,
+    (ray, prims): (&TravRay, &Triangles<'_>),
     sink: &K,
     count: &mut C,
 ) -> bool {
-    let block_ray = BlockRay::new(ray, tree.reach());
+    let (block_ray, mut room) = (BlockRay::new(ray, tree.reach()), TriBlock::EMPTY);
     let mut stack = Stack::<T, N::Mark>::new();
     let mut kids = N::kids();
     loop {
         if word.is_leaf() {
-            for block in tree.leaf_blocks(word, count) {
+            for i in 0..tree.span(word) {
+                let block = tree.block((word, i), prims, &mut room, count);
                 if test.may_meet::<S>(block, mark) && block.occluded::<S, C, K>(ray, &block_ray, sink, count) {
                     return true;
                 }

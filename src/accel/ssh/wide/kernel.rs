@@ -16,7 +16,7 @@ use crate::{
             walk::{self, Kernel},
         },
     },
-    geom::Aabb,
+    geom::{Aabb, Triangles},
     simd::{Halves, Lanes, Scalar, Simd, Task},
 };
 
@@ -324,7 +324,7 @@ pub(super) type Start = (Word, Segment<f32>);
 pub(super) struct ClosestFrom<'a, const K: usize, C, H> {
     pub(super) tree: &'a Wide<K>,
     pub(super) start: Option<Start>,
-    pub(super) ray: &'a TravRay,
+    pub(super) ray: (&'a TravRay, &'a Triangles<'a>),
     pub(super) best: &'a mut Closest,
     pub(super) sink: &'a H,
     pub(super) count: &'a mut C,
@@ -336,8 +336,8 @@ impl<const K: usize, C: Counter, H: HitSink> Task for ClosestFrom<'_, K, C, H> {
     #[inline(always)]
     fn run<S: Simd>(self) {
         let Self { tree, start, ray, best, sink, count } = self;
-        let test = FastKernel::<S>::new(ray, tree.reach, best.t_cull());
-        let start = start.unwrap_or_else(|| (Wide::<K>::root(), test.clipped(ray.range().t_near, &tree.bounds)));
+        let test = FastKernel::<S>::new(ray.0, tree.reach, best.t_cull());
+        let start = start.unwrap_or_else(|| (Wide::<K>::root(), test.clipped(ray.0.range().t_near, &tree.bounds)));
         if is_open(start.1) {
             walk::closest::<S, _, _, C, H>(tree, test, start, ray, best, sink, count);
         }
@@ -348,7 +348,7 @@ impl<const K: usize, C: Counter, H: HitSink> Task for ClosestFrom<'_, K, C, H> {
 pub(super) struct OccludedFrom<'a, const K: usize, C, H> {
     pub(super) tree: &'a Wide<K>,
     pub(super) start: Option<Start>,
-    pub(super) ray: &'a TravRay,
+    pub(super) ray: (&'a TravRay, &'a Triangles<'a>),
     pub(super) sink: &'a H,
     pub(super) count: &'a mut C,
 }
@@ -359,8 +359,8 @@ impl<const K: usize, C: Counter, H: HitSink> Task for OccludedFrom<'_, K, C, H> 
     #[inline(always)]
     fn run<S: Simd>(self) -> bool {
         let Self { tree, start, ray, sink, count } = self;
-        let test = FastKernel::<S>::new(ray, tree.reach, ray.range().t_far);
-        let start = start.unwrap_or_else(|| (Wide::<K>::root(), test.clipped(ray.range().t_near, &tree.bounds)));
+        let test = FastKernel::<S>::new(ray.0, tree.reach, ray.0.range().t_far);
+        let start = start.unwrap_or_else(|| (Wide::<K>::root(), test.clipped(ray.0.range().t_near, &tree.bounds)));
         is_open(start.1) && walk::occluded::<S, _, _, C, H>(tree, &test, start, ray, sink, count)
     }
 }
@@ -379,12 +379,12 @@ impl<const K: usize> Wide<K> {
     #[inline(always)]
     pub(super) fn walk_closest<S: Simd, C: Counter, H: HitSink>(
         &self,
-        ray: &TravRay,
+        ray: (&TravRay, &Triangles<'_>),
         best: &mut Closest,
         sink: &H,
         count: &mut C,
     ) {
-        if self.fits(ray) {
+        if self.fits(ray.0) {
             // Called, so that packets which fall apart share the code.
             S::call(ClosestFrom { tree: self, start: None, ray, best, sink, count });
         } else {
@@ -395,8 +395,14 @@ impl<const K: usize> Wide<K> {
     /// Rare, so compiled once, not for every level.
     #[cold]
     #[inline(never)]
-    fn closest_wide<C: Counter, H: HitSink>(&self, ray: &TravRay, best: &mut Closest, sink: &H, count: &mut C) {
-        let test = WideKernel::new(ray, best.t_high());
+    fn closest_wide<C: Counter, H: HitSink>(
+        &self,
+        ray: (&TravRay, &Triangles<'_>),
+        best: &mut Closest,
+        sink: &H,
+        count: &mut C,
+    ) {
+        let test = WideKernel::new(ray.0, best.t_high());
         let segment = test.clipped(&self.bounds);
         if segment.near <= segment.far {
             walk::closest::<Scalar, _, _, C, H>(self, test, (Self::root(), segment), ray, best, sink, count);
@@ -406,11 +412,11 @@ impl<const K: usize> Wide<K> {
     #[inline(always)]
     pub(super) fn walk_occluded<S: Simd, C: Counter, H: HitSink>(
         &self,
-        ray: &TravRay,
+        ray: (&TravRay, &Triangles<'_>),
         sink: &H,
         count: &mut C,
     ) -> bool {
-        if self.fits(ray) {
+        if self.fits(ray.0) {
             S::call(OccludedFrom { tree: self, start: None, ray, sink, count })
         } else {
             self.occluded_wide(ray, sink, count)
@@ -419,8 +425,8 @@ impl<const K: usize> Wide<K> {
 
     #[cold]
     #[inline(never)]
-    fn occluded_wide<C: Counter, H: HitSink>(&self, ray: &TravRay, sink: &H, count: &mut C) -> bool {
-        let test = WideKernel::new(ray, f64::from(ray.range().t_far));
+    fn occluded_wide<C: Counter, H: HitSink>(&self, ray: (&TravRay, &Triangles<'_>), sink: &H, count: &mut C) -> bool {
+        let test = WideKernel::new(ray.0, f64::from(ray.0.range().t_far));
         let segment = test.clipped(&self.bounds);
         segment.near <= segment.far
             && walk::occluded::<Scalar, _, _, C, H>(self, &test, (Self::root(), segment), ray, sink, count)

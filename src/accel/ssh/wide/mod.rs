@@ -80,30 +80,27 @@ impl<const K: usize> Tree for Wide<K> {
     }
 
     #[inline(always)]
-    fn blocks(&self) -> &[TriBlock] {
-        &self.blocks
+    fn span(&self, word: Word) -> usize {
+        span(&self.spans, word.index())
     }
 
     #[inline(always)]
-    fn leaf_blocks<C: Counter>(&self, word: Word, count: &mut C) -> &[TriBlock] {
-        let place = word.index();
-        let blocks = &self.blocks[place..place + self.span(place)];
-        for block in blocks {
-            block.prims().for_each(|_| count.prim());
-        }
-        blocks
+    fn block<'a, C: Counter>(
+        &'a self,
+        (word, i): (Word, usize),
+        _prims: &Triangles<'_>,
+        _room: &'a mut TriBlock,
+        count: &mut C,
+    ) -> &'a TriBlock {
+        let block = &self.blocks[word.index() + i];
+        block.prims().for_each(|_| count.prim());
+        block
     }
 }
 
 impl<const K: usize> Wide<K> {
     pub(super) fn useless_planes(&self) -> usize {
         self.measured.useless
-    }
-
-    /// Blocks of the leaf that begins at a block.
-    #[inline(always)]
-    fn span(&self, first: usize) -> usize {
-        span(&self.spans, first)
     }
 
     /// Makes blocks and nodes over a wide topology.
@@ -145,18 +142,18 @@ impl<const K: usize> Wide<K> {
     fn take_positions(&mut self, prims: &Triangles<'_>, choose: bool) {
         let Self { nodes, blocks, spans, boxes, config, .. } = self;
         let spans = &spans[..];
-        let span = |word: Word| span(spans, word.index());
+        let own = |word: Word| word.index()..word.index() + span(spans, word.index());
         let leaf_planes = config.leaf_planes;
         if choose {
             boxes.resize(nodes.len(), [Aabb::EMPTY; WIDTH]);
             let store = refit::Boxes { own: boxes, first: 0 };
-            let swept = Subtree { nodes, blocks, first_node: 0, first_block: 0, store, span }.refit(prims);
+            let swept = Subtree { nodes, items: blocks, first_node: 0, first_item: 0, store, own }.refit(prims);
             self.own_area = swept.own_area;
             self.bounds = swept.aabb;
             self.measured = refit::rechoose(nodes, boxes, 0, &swept.aabb, spans, leaf_planes);
         } else {
             let store = refit::Keep { leaf_planes };
-            let swept = Subtree { nodes, blocks, first_node: 0, first_block: 0, store, span }.refit(prims);
+            let swept = Subtree { nodes, items: blocks, first_node: 0, first_item: 0, store, own }.refit(prims);
             self.own_area = swept.own_area;
             self.bounds = swept.aabb;
             self.measured = refit::measure(nodes, 0, &swept.aabb, spans, 0);
@@ -182,6 +179,7 @@ impl<const K: usize> Wide<K> {
     }
 }
 
+/// Blocks of the leaf that begins at a block.
 #[inline(always)]
 fn span(spans: &[u8], first: usize) -> usize {
     if spans.is_empty() { 1 } else { usize::from(spans[first]) }
@@ -231,24 +229,24 @@ impl<const K: usize> Accel for Wide<K> {
     #[inline(always)]
     fn closest<S: Simd, C: Counter, K2: HitSink>(
         &self,
-        _prims: &Triangles<'_>,
+        prims: &Triangles<'_>,
         ray: &TravRay,
         best: &mut Closest,
         sink: &K2,
         count: &mut C,
     ) {
-        self.walk_closest::<S, C, K2>(ray, best, sink, count);
+        self.walk_closest::<S, C, K2>((ray, prims), best, sink, count);
     }
 
     #[inline(always)]
     fn occluded<S: Simd, C: Counter, K2: HitSink>(
         &self,
-        _prims: &Triangles<'_>,
+        prims: &Triangles<'_>,
         ray: &TravRay,
         sink: &K2,
         count: &mut C,
     ) -> bool {
-        self.walk_occluded::<S, C, K2>(ray, sink, count)
+        self.walk_occluded::<S, C, K2>((ray, prims), sink, count)
     }
 
     #[inline(always)]

@@ -18,6 +18,7 @@ use crate::{
             walk,
         },
     },
+    geom::Triangles,
     simd::{Lanes, Simd},
 };
 
@@ -141,7 +142,7 @@ impl<S: Simd, const K: usize> Together<S, Wide<K>> for Packet<S> {
     fn closest_below<C: Counter, H: HitSink>(
         tree: &Wide<K>,
         (word, rays, i): (Word, &slabs::Segments<S>, usize),
-        ray: &TravRay,
+        ray: (&TravRay, &Triangles<'_>),
         best: &mut Closest,
         sink: &H,
         count: &mut C,
@@ -153,7 +154,7 @@ impl<S: Simd, const K: usize> Together<S, Wide<K>> for Packet<S> {
     fn occluded_below<C: Counter, H: HitSink>(
         tree: &Wide<K>,
         (word, rays, i): (Word, &slabs::Segments<S>, usize),
-        ray: &TravRay,
+        ray: (&TravRay, &Triangles<'_>),
         sink: &H,
         count: &mut C,
     ) -> bool {

@@ -5,7 +5,7 @@ use super::{
 use crate::{
     accel::{
         topology::MAX_DEPTH,
-        wide::{Place, WIDTH, WideNode},
+        wide::{Place, Tree, WIDTH, WideNode},
     },
     geom::{Aabb, Triangles},
 };
@@ -88,7 +88,7 @@ impl<const K: usize> Walk<'_, K> {
             return Err(format!("leaf {place} stands where {} is due", self.next_block));
         }
         let tree = self.tree;
-        let blocks = &tree.blocks[place..place + tree.span(place)];
+        let blocks = &tree.blocks[place..place + tree.span(word)];
         self.next_block += blocks.len();
         for block in blocks {
             for (lane, prim) in block.prims().enumerate() {
