@@ -23,7 +23,7 @@ pub use float_mode::{FloatModeError, check_float_mode};
 pub use lanes::{Halves, Lanes, Simd};
 pub use level::SimdLevel;
 pub use ordered::{LEAST_KEY, key_floor};
-pub use prefetch::prefetch;
+pub use prefetch::{prefetch, prefetch_either};
 pub use scalar::{Array, Scalar};
 pub use stack::Stack;
 

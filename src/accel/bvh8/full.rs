@@ -90,9 +90,11 @@ impl Format for Full {
         out: &mut [Option<Hit>],
     ) {
         if packet == 1 {
-            S::call(ClosestApart { tree, prims, rays, forms, out });
+            S::call(ClosestApart { tree, prims, rays, forms, together: false, out });
         } else {
-            let apart = |rays: &[Ray], out: &mut [Option<Hit>]| S::call(ClosestApart { tree, prims, rays, forms, out });
+            let apart = |rays: &[Ray], out: &mut [Option<Hit>]| {
+                S::call(ClosestApart { tree, prims, rays, forms, together: true, out })
+            };
             coherent::closest::<S, _>(tree, prims, (rays, packet), forms, out, apart);
         }
     }
@@ -106,9 +108,11 @@ impl Format for Full {
         out: &mut [bool],
     ) {
         if packet == 1 {
-            S::call(OccludedApart { tree, prims, rays, forms, out });
+            S::call(OccludedApart { tree, prims, rays, forms, together: false, out });
         } else {
-            let apart = |rays: &[Ray], out: &mut [bool]| S::call(OccludedApart { tree, prims, rays, forms, out });
+            let apart = |rays: &[Ray], out: &mut [bool]| {
+                S::call(OccludedApart { tree, prims, rays, forms, together: true, out })
+            };
             coherent::occluded::<S, _>(tree, prims, (rays, packet), forms, out, apart);
         }
     }

@@ -6,11 +6,12 @@
 //!
 //! # Source
 //! Wald, Benthin and Boulos, "Getting Rid of Packets", 2008, for nodes of many children against one ray; Ylitie, Karras and Laine, "Efficient Incoherent
-//! Ray Traversal on GPUs Through Compressed Wide BVHs", 2017, for the choice of the nodes. Departure: rays that lie close together go in packets, and of
-//! many single rays several are in flight (`stream.rs`).
+//! Ray Traversal on GPUs Through Compressed Wide BVHs", 2017, for the choice of the nodes. Departure: rays that lie close together go in packets,
+//! packets of rays that point apart share the top of the tree (`crown.rs`), and of many single rays several are in flight (`stream.rs`).
 //!
 //! Cost: build O(n log n) and refit O(n) on the current rayon pool; a block takes 160 bytes. Choose it for rays.
 
+mod crown;
 mod format;
 mod full;
 mod kernel;

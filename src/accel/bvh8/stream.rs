@@ -5,6 +5,7 @@
 //! the next step takes the last. Rays are prepared and their hits are rounded a vector at a time.
 
 use super::{
+    crown::{self, Rest},
     full::Full,
     kernel::{Boxes, MAX_STACK},
     node::Link,
@@ -13,12 +14,12 @@ use super::{
 use crate::{
     accel::{
         AnyHit, PACKET,
-        packet::{Nearest, PacketRays, bits},
+        packet::{Nearest, PacketRays, Spread, bits},
         run,
         wide::{Place, WIDTH},
     },
     geom::{Forms, Hit, Ray, Triangles},
-    simd::{LEAST_KEY, Lanes, Simd, Task, key_floor},
+    simd::{Lanes, Simd, Task, key_floor, prefetch_either},
 };
 
 /// Rays in flight.
@@ -37,13 +38,16 @@ fn room(words: &mut [u32; MAX_STACK], at: usize) -> &mut [u32; WIDTH] {
 struct Wing {
     rays: PacketRays,
     nearest: Nearest,
+    /// Where they go on by themselves.
+    rest: Rest,
     /// Those that are answered here.
     taken: u32,
     blocked: u32,
 }
 
 impl Wing {
-    const EMPTY: Self = Self { rays: PacketRays::EMPTY, nearest: Nearest::NONE, taken: 0, blocked: 0 };
+    const EMPTY: Self =
+        Self { rays: PacketRays::EMPTY, nearest: Nearest::NONE, rest: Rest::NONE, taken: 0, blocked: 0 };
 
     #[inline(always)]
     fn load<S: Simd>(&mut self, tree: &Tree8<Full>, rays: &[Ray], forms: Forms) {
@@ -52,6 +56,7 @@ impl Wing {
         self.rays.prepare::<S>(forms.nodes);
         self.nearest.clear();
         self.blocked = 0;
+        self.rest.whole(self.taken);
     }
 }
 
@@ -77,12 +82,11 @@ impl Flight {
         let from = &wings[wing % WINGS];
         self.boxes.take(&from.rays, lane % PACKET);
         (self.wing, self.lane) = (wing, lane);
-        self.len = 1;
-        (self.keys[0], self.links[0]) = (LEAST_KEY, Tree8::<Full>::root().bits());
+        self.len = from.rest.unload(lane % PACKET, &mut self.keys, &mut self.links);
     }
 
     #[inline(always)]
-    fn closest_step<S: Simd>(&mut self, tree: &Tree8<Full>, wings: &mut [Wing; WINGS]) {
+    fn closest_step<S: Simd, const ASK: bool>(&mut self, tree: &Tree8<Full>, wings: &mut [Wing; WINGS]) {
         self.len -= 1;
         let (key, link) = (self.keys[self.len], Link::from_bits(self.links[self.len]));
         if !self.boxes.reaches(key_floor(key)) {
@@ -99,11 +103,21 @@ impl Flight {
         let (keys, links) = (room(&mut self.keys, self.len), room(&mut self.links, self.len));
         S::descending(near, hits, Link::words(&node.links), keys, links);
         self.len += hits.count_ones() as usize;
+        if ASK {
+            self.ask(tree);
+        }
+    }
+
+    /// Asks for the memory of what comes next: other rays take their turns meanwhile.
+    #[inline(always)]
+    fn ask(&self, tree: &Tree8<Full>) {
+        let link = Link::from_bits(self.links[self.len.saturating_sub(1)]);
+        prefetch_either(link.is_leaf(), &tree.items, &tree.nodes, link.index());
     }
 
     /// True when the ray is blocked.
     #[inline(always)]
-    fn occluded_step<S: Simd>(&mut self, tree: &Tree8<Full>, wings: &[Wing; WINGS]) -> bool {
+    fn occluded_step<S: Simd, const ASK: bool>(&mut self, tree: &Tree8<Full>, wings: &[Wing; WINGS]) -> bool {
         self.len -= 1;
         let link = Link::from_bits(self.links[self.len]);
         if link.is_leaf() {
@@ -114,6 +128,9 @@ impl Flight {
         let (_, hits) = self.boxes.test::<S>(node);
         S::compress(Link::words(&node.links), hits, room(&mut self.links, self.len));
         self.len += hits.count_ones() as usize;
+        if ASK {
+            self.ask(tree);
+        }
         false
     }
 }
@@ -174,7 +191,7 @@ impl Waiting {
             if self.wing >= used {
                 return None;
             }
-            self.left = wings[self.wing % WINGS].taken;
+            self.left = wings[self.wing % WINGS].rest.left;
         }
         let lane = self.left.trailing_zeros() as usize;
         self.left &= self.left - 1;
@@ -184,13 +201,13 @@ impl Waiting {
 
 /// Flies all rays of the wings in use: to their closest hits, or to any.
 #[inline(always)]
-fn fly<S: Simd, const ANY: bool>(
+fn fly<S: Simd, const ANY: bool, const ASK: bool>(
     tree: &Tree8<Full>,
     wings: &mut [Wing; WINGS],
     used: usize,
     flights: &mut [Flight; IN_FLIGHT],
 ) {
-    let mut waiting = Waiting { wing: 0, left: wings[0].taken };
+    let mut waiting = Waiting { wing: 0, left: wings[0].rest.left };
     let mut slots = [0; IN_FLIGHT];
     let mut live = 0;
     while live < IN_FLIGHT
@@ -206,10 +223,10 @@ fn fly<S: Simd, const ANY: bool>(
             let flight = &mut flights[slots[at] % IN_FLIGHT];
             let mut is_done = false;
             if ANY {
-                is_done = flight.occluded_step::<S>(tree, wings);
+                is_done = flight.occluded_step::<S, ASK>(tree, wings);
                 wings[flight.wing % WINGS].blocked |= u32::from(is_done) << flight.lane;
             } else {
-                flight.closest_step::<S>(tree, wings);
+                flight.closest_step::<S, ASK>(tree, wings);
             }
             if is_done || flight.len == 0 {
                 let Some((wing, lane)) = waiting.next(wings, used) else {
@@ -241,6 +258,8 @@ pub(super) struct ClosestApart<'a> {
     pub(super) prims: &'a Triangles<'a>,
     pub(super) rays: &'a [Ray],
     pub(super) forms: Forms,
+    /// Whether the rays of a vector share the top of the tree.
+    pub(super) together: bool,
     pub(super) out: &'a mut [Option<Hit>],
 }
 
@@ -249,13 +268,22 @@ impl Task for ClosestApart<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self) {
-        let Self { tree, prims, rays, forms, out } = self;
+        let Self { tree, prims, rays, forms, together, out } = self;
         let mut wings = [const { Wing::EMPTY }; WINGS];
         let mut flights = [const { Flight::IDLE }; IN_FLIGHT];
+        let mut tri = Spread::EMPTY;
         let many = WINGS * S::F::LEN;
         for (rays, out) in rays.chunks(many).zip(out.chunks_mut(many)) {
             let used = load::<S>(&mut wings, tree, rays, forms);
-            fly::<S, false>(tree, &mut wings, used, &mut flights);
+            if together {
+                for wing in &mut wings[..used] {
+                    let Wing { rays, nearest, rest, taken, .. } = wing;
+                    crown::closest::<S>(tree, rays, *taken, nearest, &mut tri, rest);
+                }
+                fly::<S, false, true>(tree, &mut wings, used, &mut flights);
+            } else {
+                fly::<S, false, false>(tree, &mut wings, used, &mut flights);
+            }
             for ((wing, rays), out) in wings.iter().zip(rays.chunks(S::F::LEN)).zip(out.chunks_mut(S::F::LEN)) {
                 wing.nearest.answer::<S, _>(&wing.rays, &tree.items, &AnyHit, out);
                 for i in bits(!wing.taken & (u32::MAX >> (32 - rays.len()))) {
@@ -272,6 +300,8 @@ pub(super) struct OccludedApart<'a> {
     pub(super) prims: &'a Triangles<'a>,
     pub(super) rays: &'a [Ray],
     pub(super) forms: Forms,
+    /// Whether the rays of a vector share the top of the tree.
+    pub(super) together: bool,
     pub(super) out: &'a mut [bool],
 }
 
@@ -280,13 +310,22 @@ impl Task for OccludedApart<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self) {
-        let Self { tree, prims, rays, forms, out } = self;
+        let Self { tree, prims, rays, forms, together, out } = self;
         let mut wings = [const { Wing::EMPTY }; WINGS];
         let mut flights = [const { Flight::IDLE }; IN_FLIGHT];
+        let mut tri = Spread::EMPTY;
         let many = WINGS * S::F::LEN;
         for (rays, out) in rays.chunks(many).zip(out.chunks_mut(many)) {
             let used = load::<S>(&mut wings, tree, rays, forms);
-            fly::<S, true>(tree, &mut wings, used, &mut flights);
+            if together {
+                for wing in &mut wings[..used] {
+                    let Wing { rays, rest, taken, blocked, .. } = wing;
+                    *blocked = crown::occluded::<S>(tree, rays, *taken, &mut tri, rest);
+                }
+                fly::<S, true, true>(tree, &mut wings, used, &mut flights);
+            } else {
+                fly::<S, true, false>(tree, &mut wings, used, &mut flights);
+            }
             for ((wing, rays), out) in wings.iter().zip(rays.chunks(S::F::LEN)).zip(out.chunks_mut(S::F::LEN)) {
                 for (i, out) in out.iter_mut().enumerate() {
                     *out = wing.blocked >> i & 1 == 1;

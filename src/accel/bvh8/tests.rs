@@ -254,6 +254,48 @@ proptest! {
     }
 }
 
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 60, failure_persistence: None, ..ProptestConfig::default() })]
+
+    /// Rays from nearly one place in all directions, short and long, through triangles so long that each ray comes by more nodes than it can note. Where
+    /// short rays end there is a small triangle.
+    #[test]
+    fn scattered_rays_of_packets_find_what_each_finds_alone(
+        corners in prop::collection::vec(prop::array::uniform3(prop::array::uniform3(-100_i8..100)), 60..400),
+        rays in prop::collection::vec((prop::array::uniform3(-2_i8..3), prop::array::uniform3(-50_i8..51), 0_u8..4), 20..40),
+        size in prop_oneof![Just(1.0_f32), Just(0.1), Just(0.01)],
+    ) {
+        // The second and third corner near the first, as far as the size says.
+        let corner = |t: &[[i8; 3]; 3], i: usize| {
+            let at = |i: usize| Vec3::from(t[i].map(f32::from));
+            at(0) + if i > 0 { at(i) * size } else { Vec3::ZERO }
+        };
+        let ends = [f32::INFINITY, 2.0, 0.5, 0.25];
+        let ray = |&(o, d, end): &([i8; 3], [i8; 3], u8)| Ray {
+            t_far: ends[usize::from(end)],
+            ..Ray::new(Vec3::from(o.map(f32::from)), Vec3::from(d.map(f32::from)))
+        };
+        let rays: Vec<_> = rays.iter().map(ray).collect();
+        let mut positions: Vec<_> = corners.iter().flat_map(|t| [corner(t, 0), corner(t, 1), corner(t, 2)]).collect();
+        for ray in rays.iter().filter(|ray| ray.t_far < f32::INFINITY) {
+            let end = ray.origin + ray.dir * ray.t_far;
+            positions.extend([end, end + Vec3::new(0.25, -0.25, 0.125), end + Vec3::new(-0.25, 0.125, 0.5)]);
+        }
+        let indices: Vec<_> = (0..).step_by(3).take(positions.len() / 3).map(|i| [i, i + 1, i + 2]).collect();
+        let prims = Triangles { positions: &positions, indices: &indices, topology_epoch: 0 };
+        let tree = Bvh8::build(&prims, &Bvh8Config::default()).unwrap();
+        for level in SimdLevel::available() {
+            for packet in [7, PACKET] {
+                let (hits, blocked) = dispatch(level, Batch { tree: &tree, prims: &prims, rays: &rays, packet });
+                for (i, ray) in rays.iter().enumerate() {
+                    let alone = TravRay::new(ray).map(|ray| dispatch(level, Alone { tree: &tree, prims: &prims, ray: &ray }));
+                    prop_assert_eq!((hits[i], blocked[i]), alone.unwrap_or((None, false)), "{} {} {:?}", level, packet, ray);
+                }
+            }
+        }
+    }
+}
+
 #[test]
 fn nodes_are_few_and_mostly_full() {
     let corner = |i: u16| Vec3::new(f32::from(i % 40), f32::from(i / 40), f32::from(i % 7) * 0.1);
