@@ -1,6 +1,7 @@
 //! `collide/<what>/<case>`: the primitives of collision on batches of cases, a throughput of cases; one thread.
 //!
-//! First of all, or with `peers` as the argument alone, whole scenes against parry3d, with ratios.
+//! First of all, or with `peers` as the argument alone, whole scenes against parry3d, with ratios; `peers tubes rays` takes those two of
+//! `boxes`, `tubes`, `cloth`, `rays`, `closest`, `steps`.
 #![allow(
     clippy::cast_possible_truncation,
     clippy::cast_possible_wrap,

@@ -67,20 +67,27 @@ fn parry_box(b: &Aabb) -> parry3d::bounding_volume::Aabb {
     parry3d::bounding_volume::Aabb::new(vector(b.min), vector(b.max))
 }
 
-/// Every scene, on one thread.
+/// The scenes, by name.
+const SCENES: [(&str, fn()); 6] =
+    [("boxes", boxes), ("tubes", tubes), ("cloth", cloth), ("rays", rays), ("closest", closest), ("steps", steps)];
+
+/// The scenes that the command line names, or all, on one thread.
 pub(crate) fn run() {
+    let wanted: Vec<String> =
+        std::env::args().filter(|argument| SCENES.iter().any(|(name, _)| name == argument)).collect();
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread");
-    pool.install(|| {
-        for count in [1000, 10_000, 50_000] {
-            broad(count, true);
-            broad(count, false);
+    for (name, scene) in SCENES {
+        if wanted.is_empty() || wanted.iter().any(|w| w == name) {
+            pool.install(scene);
         }
-        tubes();
-        cloth();
-        rays();
-        closest();
-        steps();
-    });
+    }
+}
+
+fn boxes() {
+    for count in [1000, 10_000, 50_000] {
+        broad(count, true);
+        broad(count, false);
+    }
 }
 
 fn broad(count: usize, calm: bool) {

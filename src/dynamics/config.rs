@@ -83,7 +83,7 @@ pub struct LoopCounts {
     pub rebuilds_begun: u64,
     /// Rebuilt trees swapped in.
     pub swaps: u64,
-    /// Levels over groups made anew; a frame in which no group moved keeps the one it has.
+    /// Levels over groups brought to a frame, by a refit or anew; a frame in which no group moved keeps the one it has.
     pub tops: u64,
     /// Those of them that sorted event lists: none unless the level over groups is `events`.
     pub event_sorts: u64,

@@ -1,10 +1,11 @@
 //! Plots as SVG, with the fonts of whoever shows them.
 
 use plotters::{
-    chart::{ChartBuilder, ChartContext},
+    chart::{ChartBuilder, ChartContext, MeshStyle},
     coord::{
         Shift,
         combinators::{IntoLogRange, LogCoord},
+        ranged1d::{AsRangedCoord, ValueFormatter},
     },
     prelude::*,
     style::text_anchor::{HPos, Pos, VPos},
@@ -180,22 +181,8 @@ impl Plot {
 fn draw_lines(root: &Area<'_>, title: &str, lines: &Lines) -> Result<(), Failed> {
     let [x, y] = [decades(&lines.lines, |p| p.0), decades(&lines.lines, |p| p.1)];
     let plot = begin(root, title, &lines.lines)?;
-    let mut chart = ChartBuilder::on(&plot)
-        .margin(8)
-        .x_label_area_size(BELOW)
-        .y_label_area_size(LEFT)
-        .build_cartesian_2d((x.0..x.1).log_scale(), (y.0..y.1).log_scale())?;
-    chart
-        .configure_mesh()
-        .x_desc(&lines.x)
-        .y_desc(&lines.y)
-        .x_label_formatter(&|x| short(*x))
-        .y_label_formatter(&|y| short(*y))
-        .bold_line_style(GRID)
-        .light_line_style(TRANSPARENT)
-        .axis_style(FRAME)
-        .label_style(("sans-serif", 13))
-        .draw()?;
+    let mut chart = axes(&plot, (x.0..x.1).log_scale(), y)?;
+    draw_numbered(&mut chart, [&lines.x, &lines.y])?;
     for line in &lines.lines {
         let points = line.points.iter().copied().filter(|p| drawable(p.0) && drawable(p.1)).collect::<Vec<_>>();
         chart.draw_series(LineSeries::new(points.iter().copied(), color(line).stroke_width(2)))?;
@@ -208,22 +195,8 @@ fn draw_series(root: &Area<'_>, title: &str, series: &Series) -> Result<(), Fail
     let y = decades(&series.lines, |p| p.1);
     let last = series.lines.iter().flat_map(|l| &l.points).map(|p| p.0).fold(1.0, f64::max);
     let plot = begin(root, title, &series.lines)?;
-    let mut chart = ChartBuilder::on(&plot)
-        .margin(8)
-        .x_label_area_size(BELOW)
-        .y_label_area_size(LEFT)
-        .build_cartesian_2d(0.0..last, (y.0..y.1).log_scale())?;
-    chart
-        .configure_mesh()
-        .x_desc(&series.x)
-        .y_desc(&series.y)
-        .x_label_formatter(&|x| short(*x))
-        .y_label_formatter(&|y| short(*y))
-        .bold_line_style(GRID)
-        .light_line_style(TRANSPARENT)
-        .axis_style(FRAME)
-        .label_style(("sans-serif", 13))
-        .draw()?;
+    let mut chart = axes(&plot, 0.0..last, y)?;
+    draw_numbered(&mut chart, [&series.x, &series.y])?;
     for line in &series.lines {
         let points = line.points.iter().copied().filter(|p| p.0.is_finite() && drawable(p.1));
         chart.draw_series(LineSeries::new(points, color(line).stroke_width(2)))?;
@@ -234,22 +207,10 @@ fn draw_series(root: &Area<'_>, title: &str, series: &Series) -> Result<(), Fail
 fn draw_bars(root: &Area<'_>, title: &str, bars: &Bars) -> Result<(), Failed> {
     let y = decades(&bars.lines, |p| p.1);
     let plot = begin(root, title, &bars.lines)?;
-    let mut chart = ChartBuilder::on(&plot)
-        .margin(8)
-        .x_label_area_size(BELOW)
-        .y_label_area_size(LEFT)
-        .build_cartesian_2d(0.0..bars.groups.len().max(1) as f64, (y.0..y.1).log_scale())?;
-    chart
-        .configure_mesh()
-        .disable_x_mesh()
-        .x_labels(0)
-        .y_desc(&bars.y)
-        .y_label_formatter(&|y| short(*y))
-        .bold_line_style(GRID)
-        .light_line_style(TRANSPARENT)
-        .axis_style(FRAME)
-        .label_style(("sans-serif", 13))
-        .draw()?;
+    let mut chart = axes(&plot, 0.0..bars.groups.len().max(1) as f64, y)?;
+    let mut mesh = chart.configure_mesh();
+    mesh.disable_x_mesh().x_labels(0).y_desc(&bars.y).y_label_formatter(&|y| short(*y));
+    draw_mesh(&mut mesh)?;
     for (i, group) in bars.groups.iter().enumerate() {
         let (px, py) = chart.backend_coord(&(i as f64 + 0.5, y.0));
         let origin = plot.get_base_pixel();
@@ -278,22 +239,11 @@ fn draw_scatter(root: &Area<'_>, title: &str, scatter: &Scatter) -> Result<(), F
     let all = [Line::new(0, "", points(true).chain(points(false)).map(|p| p.1).collect())];
     let [x, y] = [decades(&all, |p| p.0), decades(&all, |p| p.1)];
     let plot = begin(root, title, &scatter_legend())?;
-    let mut chart = ChartBuilder::on(&plot)
-        .margin(8)
-        .x_label_area_size(BELOW)
-        .y_label_area_size(LEFT)
-        .build_cartesian_2d((x.0..x.1).log_scale(), (y.0..y.1).log_scale())?;
-    chart
-        .configure_mesh()
-        .x_desc(&scatter.x)
-        .y_desc(&scatter.y)
-        .x_label_formatter(&|x| short(*x))
-        .y_label_formatter(&|y| if *y <= floor * 1.01 { "0".to_owned() } else { short(*y) })
-        .bold_line_style(GRID)
-        .light_line_style(TRANSPARENT)
-        .axis_style(FRAME)
-        .label_style(("sans-serif", 13))
-        .draw()?;
+    let mut chart = axes(&plot, (x.0..x.1).log_scale(), y)?;
+    let upward = |y: &f64| if *y <= floor * 1.01 { "0".to_owned() } else { short(*y) };
+    let mut mesh = chart.configure_mesh();
+    mesh.x_desc(&scatter.x).y_desc(&scatter.y).x_label_formatter(&|x| short(*x)).y_label_formatter(&upward);
+    draw_mesh(&mut mesh)?;
     let origin = plot.get_base_pixel();
     for (dot, at) in points(false).chain(points(true)) {
         let (px, py) = chart.backend_coord(&at);
@@ -339,6 +289,37 @@ fn begin<'a>(root: &Area<'a>, title: &str, lines: &[Line]) -> Result<Area<'a>, F
         y += 20;
     }
     Ok(plot)
+}
+
+/// Axes in `plot`, the upward one of decades.
+fn axes<'p, 'b, X: AsRangedCoord<Value = f64>>(
+    plot: &'p Area<'b>,
+    x: X,
+    y: (f64, f64),
+) -> Result<LogChart<'p, 'b, X::CoordDescType>, Failed> {
+    ChartBuilder::on(plot)
+        .margin(8)
+        .x_label_area_size(BELOW)
+        .y_label_area_size(LEFT)
+        .build_cartesian_2d(x, (y.0..y.1).log_scale())
+}
+
+/// Draws axes with names and numbers.
+fn draw_numbered<X>(chart: &mut LogChart<'_, '_, X>, names: [&str; 2]) -> Result<(), Failed>
+where
+    X: Ranged<ValueType = f64> + ValueFormatter<f64>,
+{
+    let mut mesh = chart.configure_mesh();
+    mesh.x_desc(names[0]).y_desc(names[1]).x_label_formatter(&|x| short(*x)).y_label_formatter(&|y| short(*y));
+    draw_mesh(&mut mesh)
+}
+
+/// Draws axes and lines across, in the colours and letters of all plots.
+fn draw_mesh<X>(mesh: &mut MeshStyle<'_, '_, X, LogCoord<f64>, SVGBackend<'_>>) -> Result<(), Failed>
+where
+    X: Ranged<ValueType = f64> + ValueFormatter<f64>,
+{
+    mesh.bold_line_style(GRID).light_line_style(TRANSPARENT).axis_style(FRAME).label_style(("sans-serif", 13)).draw()
 }
 
 /// Marks points given in the chart's coordinates.

@@ -7,6 +7,7 @@
 //! ```
 //!
 //! That takes hours; `KINORA_HARD_SCENES=60` takes as many of those rays as fit into 60 seconds a trial, and says how many they were.
+//! `KINORA_HARD_SCENES_KINDS=bvh8,bvh2` takes these structures only.
 #![allow(
     clippy::cast_possible_truncation,
     clippy::cast_possible_wrap,

@@ -43,6 +43,17 @@ pub(crate) fn limit() -> Option<Duration> {
     asked()?.parse().ok().map(Duration::from_secs)
 }
 
+/// True for kinds that `KINORA_HARD_SCENES_KINDS` names, as `bvh8,bvh2`; all without it.
+///
+/// # Panics
+/// When it names one that there is not.
+fn is_wanted(kind: AccelKind) -> bool {
+    let Ok(names) = std::env::var("KINORA_HARD_SCENES_KINDS") else { return true };
+    let known = |name: &str| AccelKind::ALL.iter().any(|k| k.name() == name);
+    names.split(',').for_each(|name| assert!(known(name), "KINORA_HARD_SCENES_KINDS: there is no {name}"));
+    names.split(',').any(|name| name == kind.name())
+}
+
 /// How many: in full, as a share in release builds, without optimisation.
 pub(crate) fn count(full: usize, release: usize, debug: usize) -> usize {
     if is_full() {
@@ -152,13 +163,13 @@ pub(crate) struct Candidate {
     pub(crate) slow: bool,
 }
 
-/// All structures over `mesh`, fresh and, if asked for and they can, refitted from elsewhere; each valid.
+/// All structures over `mesh` that are wanted, fresh and, if asked for and they can, refitted from elsewhere; each valid.
 pub(crate) fn candidates(mesh: &Mesh, refitted: bool) -> Vec<Candidate> {
     let mut all = Vec::new();
     let specs = AccelKind::ALL.iter().map(|&kind| AccelSpec::new(kind));
     let flat = "events:form=flat".parse().expect("a setting of events");
     let elsewhere = displaced(mesh);
-    for spec in specs.chain([flat]) {
+    for spec in specs.chain([flat]).filter(|spec| is_wanted(spec.kind())) {
         let kind = spec.kind();
         let slow = kind == AccelKind::List || spec.to_string().contains("flat");
         let fresh = spec.build(&mesh.prims()).expect("the mesh builds");

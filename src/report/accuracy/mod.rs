@@ -5,6 +5,7 @@
 
 mod bounds;
 mod contacts;
+mod costs;
 mod flip;
 pub mod hard;
 mod images;
@@ -97,7 +98,8 @@ impl Rows {
 
     /// A sentence on everything but rays.
     fn in_short(&self) -> Vec<String> {
-        let mut out = vec![hard::in_short(), updates::in_short(&self.updates)];
+        let mut out: Vec<String> = costs::in_short(&self.rays).into_iter().collect();
+        out.extend([hard::in_short(), updates::in_short(&self.updates)]);
         out.extend(skin::in_short(&self.skins));
         out.push(contacts::in_short(&self.contacts));
         out.extend(needs::in_short(&self.needs));
@@ -123,6 +125,7 @@ impl Rows {
     fn tables(&self) -> Vec<Table> {
         let mut tables = vec![
             bounds::table(),
+            costs::table(&self.rays),
             hard::table(),
             points::table(&points::points(&self.rays)),
             updates::points(&self.updates),
