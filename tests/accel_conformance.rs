@@ -29,8 +29,8 @@ fn build_spec(spec: &AccelSpec, mesh: &Mesh) -> AnyAccel {
     accel
 }
 
-/// Forms of structures beside the default ones, with kernels of their own.
-const FORMS: [&str; 2] = ["ssh:planes=3", "ssh:planes=4"];
+/// Forms of structures beside the default ones, with kernels or builders of their own.
+const FORMS: [&str; 4] = ["ssh:planes=3", "ssh:planes=4", "bvh2:build=fast", "bvh8:build=fast"];
 
 /// Every structure but `list`, and the other forms.
 fn specs() -> Vec<AccelSpec> {
@@ -533,7 +533,17 @@ fn settings_change_the_tree_but_no_answer() {
     let rays = rays_at(&mesh, 300, 78);
     let reference = build(AccelKind::Bvh2, &mesh);
     let due: Vec<_> = closest(&reference, &mesh.prims(), &rays, SimdLevel::best()).into_iter().map(bits).collect();
-    for text in ["bvh2:bins=2", "bvh2:bins=64,leaf=1", "bvh2:leaf=8", "bvh2:build=median,leaf=1", "bvh2:build=median"] {
+    for text in [
+        "bvh2:bins=2",
+        "bvh2:bins=64,leaf=1",
+        "bvh2:leaf=8",
+        "bvh2:build=median,leaf=1",
+        "bvh2:build=median",
+        "bvh2:build=fast",
+        "bvh2:build=fast,leaf=1",
+        "bvh2:build=fast,leaf=3",
+        "bvh8:build=fast,leaf=32",
+    ] {
         let spec: AccelSpec = text.parse().expect("known settings");
         let accel = spec.build(&mesh.prims()).expect("the mesh builds");
         accel.validate(&mesh.prims()).expect("valid");

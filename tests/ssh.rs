@@ -123,6 +123,9 @@ fn settings_change_no_answer() {
         "ssh:build=median",
         "ssh:build=median,leaf=1",
         "ssh:build=median,leaf=7",
+        "ssh:build=fast",
+        "ssh:build=fast,leaf=1",
+        "ssh:planes=3,build=fast",
         "ssh:leaf_planes=off",
         "ssh:leaf_planes=off,leaf=1",
         "ssh:bins=2,leaf=3",
@@ -144,7 +147,7 @@ fn settings_change_no_answer() {
 #[test]
 fn unknown_settings_are_refused() {
     let error = |spec: &str| spec.parse::<AccelSpec>().unwrap_err().to_string();
-    assert_eq!(error("ssh:build=fast"), "ssh: setting `build`: `fast` is not one of sah, median");
+    assert_eq!(error("ssh:build=good"), "ssh: setting `build`: `good` is not one of sah, median, fast");
     assert_eq!(error("ssh:planes=6"), "ssh: setting `planes`: `6` is not one of 1, 3, 4");
     assert_eq!(error("ssh:leaf=0"), "ssh: setting `leaf`: `0` is not a number from 1 to 32");
     assert_eq!(error("ssh:leaf_planes=1"), "ssh: setting `leaf_planes`: `1` is not one of on, off");

@@ -74,6 +74,15 @@ impl TriBlock {
         })
     }
 
+    /// Appends [`TriBlock::of`].
+    pub(super) fn push(prims: &[u32], out: &mut Vec<Self>) {
+        for chunk in prims.chunks(BLOCK) {
+            let mut lanes = [NO_PRIM; BLOCK];
+            lanes[..chunk.len()].copy_from_slice(chunk);
+            out.push(Self::new(lanes));
+        }
+    }
+
     /// Triangles of the block, in lane order.
     pub(super) fn prims(&self) -> impl Iterator<Item = PrimId> + '_ {
         self.prims.iter().filter(|&&p| p != NO_PRIM).map(|&p| PrimId(p))

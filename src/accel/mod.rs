@@ -39,6 +39,8 @@ pub use topology::Cut;
 
 pub use crate::geom::{Forms, Precision};
 
+use rayon::prelude::*;
+
 use crate::{
     geom::{Aabb, Hit, Ray, Triangles},
     simd::{FloatModeError, Simd},
@@ -297,12 +299,28 @@ pub trait Accel: Sized + Clone + Send + Sync + std::fmt::Debug + 'static {
     }
 }
 
+/// Triangles whose indices one task checks.
+const CHECKED: usize = 1 << 16;
+
 /// Checks every index of `prims`, and their number against `limit`.
 fn check_indices(structure: &'static str, prims: &Triangles<'_>, limit: usize) -> Result<(), BuildError> {
     if prims.len() > limit {
         return Err(BuildError::TooMany { structure, limit, actual: prims.len() });
     }
     let count = prims.positions.len();
+    let greatest = |indices: &[[u32; 3]]| {
+        let mut greatest = [0; 3];
+        for corners in indices {
+            for i in 0..3 {
+                greatest[i] = corners[i].max(greatest[i]);
+            }
+        }
+        greatest[0].max(greatest[1]).max(greatest[2])
+    };
+    let greatest = prims.indices.par_chunks(CHECKED).map(greatest).max();
+    if greatest.is_none_or(|vertex| (vertex as usize) < count) {
+        return Ok(());
+    }
     for (prim, corners) in prims.indices.iter().enumerate() {
         if let Some(&vertex) = corners.iter().find(|&&i| i as usize >= count) {
             return Err(BuildError::IndexOutOfRange { prim, vertex, count });

@@ -50,7 +50,7 @@ impl Format for Full {
 
     fn push_leaf(own: &[u32], _prims: &Triangles<'_>, blocks: &mut Vec<TriBlock>) -> Link {
         let first = blocks.len();
-        blocks.extend(TriBlock::of(own));
+        TriBlock::push(own, blocks);
         Link::leaf(first, blocks.len() - first)
     }
 

@@ -83,9 +83,17 @@ impl<F: Format> Tree for Tree8<F> {
 impl<F: Format> Tree8<F> {
     /// Makes leaves and nodes over a wide topology.
     fn emit(&mut self, topology: &[[Child; WIDTH]], order: &[u32], prims: &Triangles<'_>) {
-        let link =
-            |child: &Child| if let Child::Inner(node) = *child { Link::inner(node as usize) } else { Link::NONE };
-        self.nodes.extend(topology.iter().map(|children| F::Node::new(children.each_ref().map(link))));
+        self.nodes.reserve_exact(topology.len());
+        self.items.reserve(blocks(topology));
+        for children in topology {
+            let mut links = [Link::NONE; WIDTH];
+            for slot in 0..WIDTH {
+                if let Child::Inner(node) = children[slot] {
+                    links[slot] = Link::inner(node as usize);
+                }
+            }
+            self.nodes.push(F::Node::new(links));
+        }
         self.number_leaves(topology, (order, prims), 0);
     }
 
@@ -127,6 +135,17 @@ impl<F: Format> Tree8<F> {
     }
 }
 
+/// Blocks that the leaves of a wide topology take.
+fn blocks(topology: &[[Child; WIDTH]]) -> usize {
+    let mut blocks = 0;
+    for child in topology.as_flattened() {
+        if let Child::Leaf { count, .. } = *child {
+            blocks += TriBlock::count_for(count as usize);
+        }
+    }
+    blocks
+}
+
 impl<F: Format> Refittable for Tree8<F> {
     fn lineage(&self) -> &Lineage {
         &self.lineage
@@ -156,7 +175,7 @@ impl<F: Format> Accel for Tree8<F> {
             cost: 0.0,
             own_area: 0.0,
         };
-        out.emit(&collapse(&binary, prims), &binary.prims, prims);
+        out.emit(&collapse(&binary), &binary.prims, prims);
         out.take_positions(prims);
         out.lineage.set_fresh_cost(out.relative_cost());
         Ok(out)

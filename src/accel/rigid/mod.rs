@@ -81,7 +81,7 @@ impl RigidTree {
         check_indices("rigid", prims, MAX_PRIMS - 1)?;
         let settings = topology::Settings { cut: Cut::Sah, bins: 16, leaf: BLOCK };
         let binary = topology::build(prims, &settings);
-        let wide = collapse(&binary, prims);
+        let wide = collapse(&binary);
         let mut out = Self { nodes: vec![Eight::EMPTY; wide.len()], blocks: Vec::new(), reach: DVec3::ZERO };
         let mut boxes = vec![Aabb::EMPTY; wide.len()];
         for (number, children) in wide.iter().enumerate().rev() {

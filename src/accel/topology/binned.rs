@@ -23,8 +23,9 @@ pub(super) fn split<const N: usize>(
     let binning = Binning::new(centers, bins);
     let filled = reduce(refs, |refs| Bins::<N>::fill(refs, &binning), Bins::merge);
     let (axis, bin) = filled.best(bins, refs.len(), settings)?;
+    let area = filled.bounds[0][..bins].iter().fold(Bounds::EMPTY, |b, &bin| b.union(bin)).half_area() as f32;
     let (middle, centers) = partition(refs, |r| binning.bin_of(r.center(), axis) < bin);
-    Some(Halves { middle, axis, centers })
+    Some(Halves { middle, axis, centers, area })
 }
 
 /// How centres map to bins.

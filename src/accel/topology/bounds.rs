@@ -4,7 +4,7 @@ use glam::{Vec3A, Vec4};
 use rayon::prelude::*;
 
 use super::CHUNK;
-use crate::geom::{PrimId, Triangles};
+use crate::geom::Triangles;
 
 /// A triangle's box and number, 32 bytes: the number is in the bits of `min`'s fourth lane.
 #[derive(Clone, Copy, Debug)]
@@ -22,9 +22,17 @@ const NORMAL: u32 = 1 << 30;
 pub(super) const MAX_NUMBER: u32 = 1 << 28;
 
 impl PrimRef {
+    #[inline(always)]
     pub(super) fn new(prims: &Triangles<'_>, id: u32) -> Self {
-        let aabb = prims.finite_aabb(PrimId(id));
-        Self { min: aabb.min.extend(f32::from_bits(NORMAL | id)), max: aabb.max.extend(0.0) }
+        // Without closures, which stay calls here.
+        let [a, b, c] = prims.indices[id as usize];
+        let (a, b, c) = (prims.positions[a as usize], prims.positions[b as usize], prims.positions[c as usize]);
+        let (a, b, c) = (Vec3A::from(a), Vec3A::from(b), Vec3A::from(c));
+        // A product with 0 is 0 unless the factor is infinite or NaN.
+        let is_finite = (a * 0.0 + b * 0.0) + c * 0.0 == Vec3A::ZERO;
+        let (min, max) =
+            if is_finite { (a.min(b).min(c), a.max(b).max(c)) } else { (Vec3A::INFINITY, Vec3A::NEG_INFINITY) };
+        Self { min: min.extend(f32::from_bits(NORMAL | id)), max: max.extend(0.0) }
     }
 
     #[inline(always)]
@@ -32,9 +40,29 @@ impl PrimRef {
         self.min.w.to_bits() & !NORMAL
     }
 
+    /// With every coordinate times `factor`.
+    #[inline(always)]
+    fn scaled(&self, factor: f32) -> Self {
+        let mut min = self.min * factor;
+        min.w = self.min.w;
+        Self { min, max: self.max * factor }
+    }
+
     #[inline(always)]
     pub(super) fn bounds(&self) -> Bounds {
         Bounds { min: Vec3A::from_vec4(self.min), max: Vec3A::from_vec4(self.max) }
+    }
+
+    /// True for a triangle that is never hit.
+    #[inline(always)]
+    pub(super) fn is_absent(&self) -> bool {
+        self.min.x > self.max.x
+    }
+
+    /// The box; a point for a triangle that is never hit.
+    #[inline(always)]
+    pub(super) fn present_bounds(&self) -> Bounds {
+        if self.is_absent() { Bounds { min: Vec3A::ZERO, max: Vec3A::ZERO } } else { self.bounds() }
     }
 
     /// Midpoint of the box; 0 for a triangle that is never hit.
@@ -71,9 +99,25 @@ impl Bounds {
         Self { min: self.min.min(point), max: self.max.max(point) }
     }
 
+    /// The box around all.
+    pub(super) fn around(refs: &[PrimRef]) -> Self {
+        refs.iter().fold(Self::EMPTY, |b, r| b.union(r.bounds()))
+    }
+
     /// The box of the centres.
     pub(super) fn of_centers(refs: &[PrimRef]) -> Self {
         refs.iter().fold(Self::EMPTY, |b, r| b.grown(r.center()))
+    }
+
+    /// The same, without triangles that are never hit.
+    pub(super) fn of_present_centers(refs: &[PrimRef]) -> Self {
+        let mut all = Self::EMPTY;
+        for prim in refs {
+            if !prim.is_absent() {
+                all = all.grown(prim.center());
+            }
+        }
+        all
     }
 
     pub(super) fn is_empty(&self) -> bool {
@@ -102,6 +146,25 @@ impl Bounds {
         } else {
             2
         }
+    }
+}
+
+/// Coordinates whose squares are far from both ends of what f32 holds.
+const ORDINARY: std::ops::Range<f32> = 1e-9..1e9;
+
+/// Makes coordinates ordinary where they are not, so that areas neither overflow nor vanish.
+pub(super) fn normalize(refs: &mut [PrimRef]) {
+    let reach = |b: Bounds| b.max.abs().max(b.min.abs()).max_element();
+    let of = |refs: &[PrimRef]| {
+        let all = refs.iter().filter(|r| !r.is_absent()).fold(Bounds::EMPTY, |b, r| b.union(r.bounds()));
+        if all.is_empty() { 0.0 } else { reach(all) }
+    };
+    let reach = reduce(refs, of, f32::max);
+    if reach > 0.0 && !ORDINARY.contains(&reach) {
+        // The power of two with the negative exponent, or next to it: digits stay as they are.
+        let exponent = reach.max(f32::MIN_POSITIVE).to_bits() & (255 << 23);
+        let factor = f32::from_bits((254 << 23) - exponent).max(f32::MIN_POSITIVE);
+        refs.par_iter_mut().for_each(|r| *r = r.scaled(factor));
     }
 }
 

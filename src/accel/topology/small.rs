@@ -26,6 +26,8 @@ struct Sorted<'a> {
 struct Place {
     axis: usize,
     count: usize,
+    /// Half the area of the box around all.
+    area: f32,
 }
 
 /// Emits the subtree over a run of at most [`SMALL`] triangles.
@@ -86,7 +88,7 @@ impl Sorted<'_> {
         };
         self.apply(range.clone(), place);
         let parent = out.len();
-        out.push(Siblings { children: [Child::None; 2], axis: low_bits(place.axis) });
+        out.push(Siblings { area: place.area, axis: low_bits(place.axis), ..Siblings::NONE });
         let middle = range.start + place.count;
         let first = self.child(range.start..middle, base, depth + 1, out);
         let second = self.child(middle..range.end, base, depth + 1, out);
@@ -108,13 +110,13 @@ impl Sorted<'_> {
             return Some(place);
         }
         let centers = range.fold(Bounds::EMPTY, |b, i| b.grown(self.refs[self.orders[0][i] as usize].center()));
-        Some(Place { axis: centers.longest_axis(), count: self.settings.half(count) })
+        Some(Place { axis: centers.longest_axis(), count: self.settings.half(count), ..place })
     }
 
     /// The best cut and the cost of a visit to the node when it is made.
     fn sweep(&mut self, range: std::ops::Range<usize>) -> (f64, Place) {
         let (start, count) = (range.start, range.len());
-        let (mut least, mut best, mut area) = (f64::INFINITY, None, 0.0);
+        let (mut least, mut best, mut area) = (f64::INFINITY, (0, 0), 0.0);
         for axis in 0..3 {
             let mut right = Bounds::EMPTY;
             for i in (1..count).rev() {
@@ -129,13 +131,14 @@ impl Sorted<'_> {
                 left = left.union(self.bounds(axis, start + i - 1));
                 let cost =
                     left.half_area() * self.settings.leaf_cost(i) + self.areas[i] * self.settings.leaf_cost(count - i);
-                if best.is_none() || cost < least {
-                    (least, best) = (cost, Some(Place { axis, count: i }));
+                if best.1 == 0 || cost < least {
+                    (least, best) = (cost, (axis, i));
                 }
             }
         }
         let below = if area > 0.0 { least / area } else { f64::INFINITY };
-        (COST_TRAVERSE + below, best.unwrap_or(Place { axis: 0, count: 1 }))
+        let (axis, count) = best;
+        (COST_TRAVERSE + below, Place { axis, count, area: area as f32 })
     }
 
     /// Cuts all three orders, keeping each sorted on both sides.

@@ -216,7 +216,7 @@ impl<const K: usize> Accel for Wide<K> {
             measured: Measured::default(),
             own_area: 0.0,
         };
-        out.emit(&collapse(&binary, prims), &binary.prims);
+        out.emit(&collapse(&binary), &binary.prims);
         out.take_positions(prims, true);
         out.lineage.set_fresh_cost(out.cost());
         Ok(out)
