@@ -67,7 +67,7 @@ pub struct Bvh2Config {
 
 impl Default for Bvh2Config {
     fn default() -> Self {
-        Self { build: Cut::Sah, bins: 16, leaf: MAX_LEAF }
+        Self { build: Cut::Sah, bins: 32, leaf: MAX_LEAF }
     }
 }
 

@@ -107,7 +107,7 @@ pub struct Bvh8Config {
 
 impl Default for Bvh8Config {
     fn default() -> Self {
-        Self { build: Cut::Sah, bins: 16, leaf: sah::BLOCK, layout: Layout::Full }
+        Self { build: Cut::Sah, bins: 32, leaf: sah::BLOCK, layout: Layout::Full }
     }
 }
 

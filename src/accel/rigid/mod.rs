@@ -79,7 +79,7 @@ impl RigidTree {
     /// When an index is out of range or there are more than 2^28 triangles.
     pub(crate) fn build(prims: &Triangles<'_>) -> Result<Self, BuildError> {
         check_indices("rigid", prims, MAX_PRIMS - 1)?;
-        let settings = topology::Settings { cut: Cut::Sah, bins: 16, leaf: BLOCK };
+        let settings = topology::Settings { cut: Cut::Sah, bins: 32, leaf: BLOCK };
         let binary = topology::build(prims, &settings);
         let wide = collapse(&binary);
         let mut out = Self { nodes: vec![Eight::EMPTY; wide.len()], blocks: Vec::new(), reach: DVec3::ZERO };

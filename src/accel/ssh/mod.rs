@@ -112,7 +112,7 @@ pub struct SshConfig {
 
 impl Default for SshConfig {
     fn default() -> Self {
-        Self { planes: 1, build: Cut::Sah, bins: 16, leaf: sah::BLOCK, leaf_planes: true, refit: Sides::Keep }
+        Self { planes: 1, build: Cut::Sah, bins: 32, leaf: sah::BLOCK, leaf_planes: true, refit: Sides::Keep }
     }
 }
 

@@ -1,17 +1,12 @@
 //! Cuts of large nodes: triangles fall into bins by their centres, cuts are tried between bins.
 
-#![expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "places of bins saturate and are clamped; triangles are counted in u32"
-)]
-
-use glam::Vec3A;
+#![expect(clippy::cast_possible_truncation, reason = "triangles are counted in u32")]
 
 use super::{
     Halves, Settings,
-    bounds::{Bounds, PrimRef, partition, reduce},
+    bounds::{Bounds, Choose, PrimRef, greater, lesser, partition, reduce},
 };
+use crate::simd::{Simd, SimdLevel, Task, dispatch};
 
 /// Cuts `refs` where the surface-area cost is least, over `bins` bins of all three axes; `None` when every centre falls into one bin.
 pub(super) fn split<const N: usize>(
@@ -21,46 +16,58 @@ pub(super) fn split<const N: usize>(
     settings: &Settings,
 ) -> Option<Halves> {
     let binning = Binning::new(centers, bins);
-    let filled = reduce(refs, |refs| Bins::<N>::fill(refs, &binning), Bins::merge);
-    let (axis, bin) = filled.best(bins, refs.len(), settings)?;
-    let area = filled.bounds[0][..bins].iter().fold(Bounds::EMPTY, |b, &bin| b.union(bin)).half_area() as f32;
-    let (middle, centers) = partition(refs, |r| binning.bin_of(r.center(), axis) < bin);
+    let fill = |refs: &[PrimRef]| dispatch(SimdLevel::best(), Fill::<N> { refs, binning: &binning });
+    let filled = reduce(refs, fill, Bins::merge);
+    let (axis, bin, area) =
+        dispatch(SimdLevel::best(), Best { bins: &filled, count: bins, total: refs.len(), settings })?;
+    let (middle, centers) = partition(refs, &Below { binning: &binning, axis, bin });
     Some(Halves { middle, axis, centers, area })
 }
 
 /// How centres map to bins.
 struct Binning {
-    low: Vec3A,
-    scale: Vec3A,
-    last: u32,
+    low: [f32; 4],
+    scale: [f32; 4],
+    last: f32,
 }
+
+/// Numbers from here on have no fraction: the lowest bits of their form are those of the whole number that was added.
+const WHOLE: f32 = 8_388_608.0;
 
 impl Binning {
     fn new(centers: &Bounds, bins: usize) -> Self {
-        let extent = centers.max - centers.min;
-        // An extent of 0, or one that overflows, puts everything into one bin.
-        let scale = |e: f32| {
-            let s = bins as f32 / e;
-            if e.is_finite() && s.is_finite() { s } else { 0.0 }
+        let [x, y, z] = centers.low();
+        // An extent of 0 puts everything into one bin.
+        let scale = |axis: usize| {
+            let scale = bins as f32 / centers.extent(axis);
+            if scale.is_finite() { scale } else { 0.0 }
         };
-        let scale = Vec3A::new(scale(extent.x), scale(extent.y), scale(extent.z));
-        Self { low: centers.min, scale, last: bins as u32 - 1 }
+        Self { low: [x, y, z, 0.0], scale: [scale(0), scale(1), scale(2), 0.0], last: (bins - 1) as f32 }
     }
 
+    /// The bins along the axes, and a number of no meaning. Half is taken away before the numbers are rounded to the nearest.
     #[inline(always)]
-    fn place(&self, center: Vec3A) -> Vec3A {
-        (center - self.low) * self.scale
+    fn bins_of(&self, center: [f32; 4]) -> [u32; 4] {
+        let mut bins = [0; 4];
+        for axis in 0..4 {
+            let place = (center[axis] - self.low[axis]) * self.scale[axis] - 0.5;
+            bins[axis] = (lesser(greater(place, 0.0), self.last) + WHOLE).to_bits() & 0xff;
+        }
+        bins
     }
+}
 
-    /// Float to integer saturates, NaN becomes 0.
-    #[inline(always)]
-    fn clamp(&self, place: f32) -> usize {
-        (place as u32).min(self.last) as usize
-    }
+/// Chooses what is below a bin.
+struct Below<'a> {
+    binning: &'a Binning,
+    axis: usize,
+    bin: usize,
+}
 
+impl Choose for Below<'_> {
     #[inline(always)]
-    fn bin_of(&self, center: Vec3A, axis: usize) -> usize {
-        self.clamp(self.place(center)[axis])
+    fn chooses(&self, prim: &PrimRef) -> bool {
+        self.binning.bins_of(prim.center())[self.axis & 3] < self.bin as u32
     }
 }
 
@@ -69,21 +76,31 @@ struct Bins<const N: usize> {
     counts: [[u32; N]; 3],
 }
 
-impl<const N: usize> Bins<N> {
-    fn fill(refs: &[PrimRef], binning: &Binning) -> Self {
-        let mut out = Self { bounds: [[Bounds::EMPTY; N]; 3], counts: [[0; N]; 3] };
-        for prim in refs {
-            let (bounds, place) = (prim.bounds(), binning.place(prim.center()));
+/// Fills bins.
+struct Fill<'a, const N: usize> {
+    refs: &'a [PrimRef],
+    binning: &'a Binning,
+}
+
+impl<const N: usize> Task for Fill<'_, N> {
+    type Output = Bins<N>;
+
+    #[inline(always)]
+    fn run<S: Simd>(self) -> Bins<N> {
+        let mut out = Bins { bounds: [[Bounds::EMPTY; N]; 3], counts: [[0; N]; 3] };
+        for prim in self.refs {
+            let places = self.binning.bins_of(prim.center());
             for axis in 0..3 {
-                let bin = binning.clamp(place[axis]).min(N - 1);
-                let slot = &mut out.bounds[axis][bin];
-                *slot = slot.union(bounds);
+                let bin = (places[axis] as usize).min(N - 1);
+                out.bounds[axis][bin] = out.bounds[axis][bin].union(prim.bounds());
                 out.counts[axis][bin] += 1;
             }
         }
         out
     }
+}
 
+impl<const N: usize> Bins<N> {
     fn merge(mut self, Self { bounds, counts }: Self) -> Self {
         for axis in 0..3 {
             for bin in 0..N {
@@ -93,32 +110,47 @@ impl<const N: usize> Bins<N> {
         }
         self
     }
+}
 
-    /// The axis and bin before which to cut.
-    fn best(&self, bins: usize, total: usize, settings: &Settings) -> Option<(usize, usize)> {
+/// Finds the axis and bin before which to cut, and half the area of the box around all.
+struct Best<'a, const N: usize> {
+    bins: &'a Bins<N>,
+    count: usize,
+    total: usize,
+    settings: &'a Settings,
+}
+
+impl<const N: usize> Task for Best<'_, N> {
+    type Output = Option<(usize, usize, f32)>;
+
+    #[inline(always)]
+    fn run<S: Simd>(self) -> Option<(usize, usize, f32)> {
         let mut best = None;
-        let mut least = f64::INFINITY;
+        let mut least = f32::INFINITY;
+        let mut area = 0.0;
+        let total = self.total as u32;
         for axis in 0..3 {
-            let (bounds, counts) = (&self.bounds[axis][..bins], &self.counts[axis][..bins]);
+            let (bounds, counts) = (&self.bins.bounds[axis][..self.count], &self.bins.counts[axis][..self.count]);
             let mut suffix = [0.0; N];
             let mut right = Bounds::EMPTY;
-            for i in (1..bins).rev() {
+            for i in (1..self.count).rev() {
                 right = right.union(bounds[i]);
                 suffix[i] = right.half_area();
             }
+            if axis == 0 {
+                area = right.union(bounds[0]).half_area();
+            }
             let (mut left, mut count) = (Bounds::EMPTY, 0);
-            for i in 1..bins {
+            for i in 1..self.count {
                 left = left.union(bounds[i - 1]);
-                count += counts[i - 1] as usize;
-                if count == 0 || count == total {
-                    continue;
-                }
-                let cost = left.half_area() * settings.leaf_cost(count) + suffix[i] * settings.leaf_cost(total - count);
-                if best.is_none() || cost < least {
+                count += counts[i - 1];
+                let cost = left.half_area() * self.settings.leaf_cost(count)
+                    + suffix[i] * self.settings.leaf_cost(total - count);
+                if count != 0 && count != total && (best.is_none() || cost < least) {
                     (best, least) = (Some((axis, i)), cost);
                 }
             }
         }
-        best
+        best.map(|(axis, bin)| (axis, bin, area))
     }
 }

@@ -1,112 +1,153 @@
 //! Boxes and triangle references in the form that builds read fast.
 
-use glam::{Vec3A, Vec4};
 use rayon::prelude::*;
 
 use super::CHUNK;
-use crate::geom::Triangles;
+use crate::{
+    geom::Triangles,
+    simd::{Simd, SimdLevel, Task, dispatch},
+};
 
-/// A triangle's box and number, 32 bytes: the number is in the bits of `min`'s fourth lane.
+/// A box and a word: the lower corner, the word, the upper corner times -1, and 0. The union of two is the minimum of all numbers.
+#[repr(C, align(32))]
 #[derive(Clone, Copy, Debug)]
-pub(super) struct PrimRef {
-    min: Vec4,
-    max: Vec4,
-}
+pub(super) struct Bounds([f32; 8]);
+
+/// A triangle's box, with its number in the bits of the word.
+#[derive(Clone, Copy, Debug)]
+#[repr(transparent)]
+pub(super) struct PrimRef(Bounds);
 
 const _: () = assert!(size_of::<PrimRef>() == 32);
 
-/// Set in the bits of the number, so that they are those of a normal float: arithmetic takes the fourth lane along, and is slow for others.
+/// Set in the bits of the number, so that they are those of a normal float: arithmetic takes the word along, and is slow for others.
 const NORMAL: u32 = 1 << 30;
 
 /// Numbers are below this.
 pub(super) const MAX_NUMBER: u32 = 1 << 28;
 
+/// Beyond all coordinates after [`normalize`], and their sums; its square is finite.
+const FAR: f32 = 1e18;
+
+/// Coordinates whose squares are far from both ends of what f32 holds.
+const ORDINARY: std::ops::Range<f32> = 1e-9..1e9;
+
+/// `f32::min` in one instruction; no number here is NaN.
+#[inline(always)]
+pub(super) fn lesser(a: f32, b: f32) -> f32 {
+    if a < b { a } else { b }
+}
+
+#[inline(always)]
+pub(super) fn greater(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
+}
+
 impl PrimRef {
+    /// Without closures, which stay calls here.
     #[inline(always)]
     pub(super) fn new(prims: &Triangles<'_>, id: u32) -> Self {
-        // Without closures, which stay calls here.
         let [a, b, c] = prims.indices[id as usize];
         let (a, b, c) = (prims.positions[a as usize], prims.positions[b as usize], prims.positions[c as usize]);
-        let (a, b, c) = (Vec3A::from(a), Vec3A::from(b), Vec3A::from(c));
+        let (a, b, c) = (glam::Vec3A::from(a), glam::Vec3A::from(b), glam::Vec3A::from(c));
         // A product with 0 is 0 unless the factor is infinite or NaN.
-        let is_finite = (a * 0.0 + b * 0.0) + c * 0.0 == Vec3A::ZERO;
-        let (min, max) =
-            if is_finite { (a.min(b).min(c), a.max(b).max(c)) } else { (Vec3A::INFINITY, Vec3A::NEG_INFINITY) };
-        Self { min: min.extend(f32::from_bits(NORMAL | id)), max: max.extend(0.0) }
+        let is_finite = (a * 0.0 + b * 0.0) + c * 0.0 == glam::Vec3A::ZERO;
+        let word = f32::from_bits(NORMAL | id);
+        if !is_finite {
+            return Self(Bounds([FAR, FAR, FAR, word, FAR, FAR, FAR, 0.0]));
+        }
+        let ([x0, y0, z0], [x1, y1, z1]) = (a.min(b).min(c).to_array(), a.max(b).max(c).to_array());
+        Self(Bounds([x0, y0, z0, word, -x1, -y1, -z1, 0.0]))
     }
 
     #[inline(always)]
     pub(super) fn id(&self) -> u32 {
-        self.min.w.to_bits() & !NORMAL
+        self.0.0[3].to_bits() & !NORMAL
     }
 
-    /// With every coordinate times `factor`.
-    #[inline(always)]
-    fn scaled(&self, factor: f32) -> Self {
-        let mut min = self.min * factor;
-        min.w = self.min.w;
-        Self { min, max: self.max * factor }
-    }
-
+    /// The box, empty for a triangle that is never hit; the word is not to be used.
     #[inline(always)]
     pub(super) fn bounds(&self) -> Bounds {
-        Bounds { min: Vec3A::from_vec4(self.min), max: Vec3A::from_vec4(self.max) }
+        self.0
     }
 
     /// True for a triangle that is never hit.
     #[inline(always)]
     pub(super) fn is_absent(&self) -> bool {
-        self.min.x > self.max.x
+        self.0.is_empty()
     }
 
-    /// The box; a point for a triangle that is never hit.
+    /// The lower and the upper corner; 0 for a triangle that is never hit.
     #[inline(always)]
-    pub(super) fn present_bounds(&self) -> Bounds {
-        if self.is_absent() { Bounds { min: Vec3A::ZERO, max: Vec3A::ZERO } } else { self.bounds() }
+    pub(super) fn corners(&self) -> ([f32; 3], [f32; 3]) {
+        if self.is_absent() { ([0.0; 3], [0.0; 3]) } else { (self.0.low(), self.0.high()) }
     }
 
-    /// Midpoint of the box; 0 for a triangle that is never hit.
+    /// Twice the midpoint of the box; 0 for a triangle that is never hit.
     #[inline(always)]
-    pub(super) fn center(&self) -> Vec3A {
-        let Bounds { min, max } = self.bounds();
-        if min.x > max.x { Vec3A::ZERO } else { halfway(min, max) }
+    pub(super) fn center(&self) -> [f32; 4] {
+        self.0.center()
     }
-}
 
-/// Halved first: the sum may overflow.
-#[inline(always)]
-fn halfway(a: Vec3A, b: Vec3A) -> Vec3A {
-    a * 0.5 + b * 0.5
-}
-
-/// A box.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Bounds {
-    pub(super) min: Vec3A,
-    pub(super) max: Vec3A,
+    /// With every coordinate times `factor`.
+    #[inline(always)]
+    fn scaled(&self, factor: f32) -> Self {
+        let mut out = *self;
+        if !self.is_absent() {
+            for lane in [0, 1, 2, 4, 5, 6] {
+                out.0.0[lane] *= factor;
+            }
+        }
+        out
+    }
 }
 
 impl Bounds {
-    pub(super) const EMPTY: Self = Self { min: Vec3A::INFINITY, max: Vec3A::NEG_INFINITY };
+    pub(super) const EMPTY: Self = Self([FAR; 8]);
 
     #[inline(always)]
     pub(super) fn union(self, other: Self) -> Self {
-        Self { min: self.min.min(other.min), max: self.max.max(other.max) }
+        let mut out = self;
+        for lane in 0..8 {
+            out.0[lane] = lesser(self.0[lane], other.0[lane]);
+        }
+        out
+    }
+
+    /// The box around this one and a point, the fourth number of which does not count.
+    #[inline(always)]
+    fn grown(self, [x, y, z, _]: [f32; 4]) -> Self {
+        self.union(Self([x, y, z, 0.0, -x, -y, -z, 0.0]))
     }
 
     #[inline(always)]
-    pub(super) fn grown(self, point: Vec3A) -> Self {
-        Self { min: self.min.min(point), max: self.max.max(point) }
+    pub(super) fn low(&self) -> [f32; 3] {
+        [self.0[0], self.0[1], self.0[2]]
+    }
+
+    #[inline(always)]
+    pub(super) fn high(&self) -> [f32; 3] {
+        [-self.0[4], -self.0[5], -self.0[6]]
     }
 
     /// The box around all.
+    #[inline(always)]
     pub(super) fn around(refs: &[PrimRef]) -> Self {
-        refs.iter().fold(Self::EMPTY, |b, r| b.union(r.bounds()))
+        let mut all = Self::EMPTY;
+        for prim in refs {
+            all = all.union(prim.0);
+        }
+        all
     }
 
     /// The box of the centres.
+    #[inline(always)]
     pub(super) fn of_centers(refs: &[PrimRef]) -> Self {
-        refs.iter().fold(Self::EMPTY, |b, r| b.grown(r.center()))
+        let mut all = Self::EMPTY;
+        for prim in refs {
+            all = all.grown(prim.center());
+        }
+        all
     }
 
     /// The same, without triangles that are never hit.
@@ -120,28 +161,50 @@ impl Bounds {
         all
     }
 
-    pub(super) fn is_empty(&self) -> bool {
-        self.min.x > self.max.x
-    }
-
-    pub(super) fn center(&self) -> Vec3A {
-        halfway(self.min, self.max)
-    }
-
-    /// Half the surface area; 0 for an empty box. The products are f64, which does not overflow.
     #[inline(always)]
-    pub(super) fn half_area(self) -> f64 {
-        let e = self.max - self.min;
-        let (x, y, z) = (f64::from(e.x), f64::from(e.y), f64::from(e.z));
-        if x < 0.0 { 0.0 } else { x * (y + z) + y * z }
+    pub(super) fn is_empty(&self) -> bool {
+        self.0[0] + self.0[4] > 0.0
+    }
+
+    /// Twice the midpoint, and a number of no meaning.
+    #[inline(always)]
+    pub(super) fn center(&self) -> [f32; 4] {
+        let mut out = [0.0; 4];
+        for lane in 0..4 {
+            out[lane] = self.0[lane] - self.0[lane + 4];
+        }
+        out
+    }
+
+    /// What the box measures along each axis, times -1; below 0 or 0, also for an empty box.
+    #[inline(always)]
+    fn extents(&self) -> [f32; 4] {
+        let mut out = [0.0; 4];
+        for lane in 0..4 {
+            out[lane] = lesser(self.0[lane] + self.0[lane + 4], 0.0);
+        }
+        out
+    }
+
+    /// What the box measures along an axis; 0 for an empty box.
+    #[inline(always)]
+    pub(super) fn extent(&self, axis: usize) -> f32 {
+        -self.extents()[axis]
+    }
+
+    /// Half the surface area; 0 for an empty box.
+    #[inline(always)]
+    pub(super) fn half_area(&self) -> f32 {
+        let [x, y, z, _] = self.extents();
+        x * (y + z) + y * z
     }
 
     /// The first of the axes with the greatest extent.
     pub(super) fn longest_axis(&self) -> usize {
-        let e = self.max.as_dvec3() - self.min.as_dvec3();
-        if e.x >= e.y && e.x >= e.z {
+        let [x, y, z, _] = self.extents();
+        if x <= y && x <= z {
             0
-        } else if e.y >= e.z {
+        } else if y <= z {
             1
         } else {
             2
@@ -149,15 +212,20 @@ impl Bounds {
     }
 }
 
-/// Coordinates whose squares are far from both ends of what f32 holds.
-const ORDINARY: std::ops::Range<f32> = 1e-9..1e9;
-
 /// Makes coordinates ordinary where they are not, so that areas neither overflow nor vanish.
 pub(super) fn normalize(refs: &mut [PrimRef]) {
-    let reach = |b: Bounds| b.max.abs().max(b.min.abs()).max_element();
     let of = |refs: &[PrimRef]| {
-        let all = refs.iter().filter(|r| !r.is_absent()).fold(Bounds::EMPTY, |b, r| b.union(r.bounds()));
-        if all.is_empty() { 0.0 } else { reach(all) }
+        let mut reach = [0.0; 8];
+        for prim in refs {
+            if !prim.is_absent() {
+                for lane in 0..8 {
+                    reach[lane] = greater(reach[lane], prim.0.0[lane].abs());
+                }
+            }
+        }
+        // Without the word.
+        reach[3] = 0.0;
+        reach.into_iter().fold(0.0, f32::max)
     };
     let reach = reduce(refs, of, f32::max);
     if reach > 0.0 && !ORDINARY.contains(&reach) {
@@ -180,22 +248,39 @@ pub(super) fn reduce<T: Send>(
     refs.par_chunks(CHUNK).map(&work).reduce_with(&merge).unwrap_or_else(|| work(&[]))
 }
 
-/// Moves the elements that satisfy `first` to the front, in one pass from both ends; returns their number and the boxes of
-/// the centres of both parts.
-#[inline(always)]
-pub(super) fn partition(refs: &mut [PrimRef], first: impl Fn(&PrimRef) -> bool) -> (usize, [Bounds; 2]) {
-    let (mut low, mut high) = (0, refs.len());
-    let [mut left, mut right] = [Bounds::EMPTY; 2];
-    while low < high {
-        let prim = refs[low];
-        if first(&prim) {
-            left = left.grown(prim.center());
-            low += 1;
-        } else {
-            right = right.grown(prim.center());
-            high -= 1;
-            refs.swap(low, high);
+/// A choice among references.
+pub(super) trait Choose {
+    /// True for those that are to come first.
+    fn chooses(&self, prim: &PrimRef) -> bool;
+}
+
+/// [`partition`].
+struct Partition<'a, C> {
+    refs: &'a mut [PrimRef],
+    choice: &'a C,
+}
+
+impl<C: Choose> Task for Partition<'_, C> {
+    type Output = (usize, [Bounds; 2]);
+
+    #[inline(always)]
+    fn run<S: Simd>(self) -> (usize, [Bounds; 2]) {
+        let Self { refs, choice } = self;
+        let mut middle = 0;
+        for i in 0..refs.len() {
+            // No branch: it would be mispredicted every other time.
+            let (prim, other) = (refs[i], refs[middle]);
+            let is_chosen = choice.chooses(&prim);
+            refs[i] = other;
+            refs[middle] = prim;
+            middle += usize::from(is_chosen);
         }
+        let (first, second) = refs.split_at(middle);
+        (middle, [Bounds::of_centers(first), Bounds::of_centers(second)])
     }
-    (low, [left, right])
+}
+
+/// Moves the chosen elements to the front; returns their number and the boxes of the centres of both parts.
+pub(super) fn partition(refs: &mut [PrimRef], choice: &impl Choose) -> (usize, [Bounds; 2]) {
+    dispatch(SimdLevel::best(), Partition { refs, choice })
 }

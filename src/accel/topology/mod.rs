@@ -22,7 +22,7 @@ use rayon::prelude::*;
 
 use super::sah::{BLOCK, COST_BLOCK};
 use crate::geom::Triangles;
-use bounds::{Bounds, PrimRef};
+use bounds::{Bounds, Choose, PrimRef};
 
 /// Most pairs on a path from the root: the length of traversal stacks.
 pub(super) const MAX_DEPTH: usize = 64;
@@ -32,6 +32,10 @@ pub(super) const MAX_LEAF: usize = 32;
 
 /// Most bins an axis may have.
 pub(super) const MAX_BINS: usize = 64;
+
+/// Nodes have a bin for so many triangles, unless that is fewer bins than these.
+const PER_BIN: usize = 8;
+const LEAST_BINS: usize = 8;
 
 /// Nodes of fewer triangles are built by one task.
 const TASK: usize = 8192;
@@ -149,7 +153,9 @@ pub(super) fn build(prims: &Triangles<'_>, settings: &Settings) -> Topology {
     let centers = bounds::reduce(&refs, Bounds::of_centers, Bounds::union);
     let root = match refs.len() {
         0 => Child::None,
-        _ => Builder { settings }.child(Run { refs: &mut refs, order: &mut order, first: 0 }, &centers, 0, &mut pairs),
+        _ => {
+            Builder::new(settings).child(Run { refs: &mut refs, order: &mut order, first: 0 }, &centers, 0, &mut pairs)
+        }
     };
     if !matches!(root, Child::Inner(_)) {
         // A walk begins at a pair, so a lone leaf gets one.
@@ -196,6 +202,7 @@ impl Child {
     }
 
     /// The child when its pair number counts from `pairs` on.
+    #[inline(always)]
     fn moved(self, pairs: usize) -> Self {
         match self {
             Self::Inner(pair) => Self::inner(pair as usize + pairs),
@@ -214,14 +221,24 @@ struct Halves {
 
 struct Builder<'a> {
     settings: &'a Settings,
+    /// Cost of a leaf of so many triangles.
+    costs: [f32; small::SMALL + 1],
 }
 
-impl Builder<'_> {
+impl<'a> Builder<'a> {
+    fn new(settings: &'a Settings) -> Self {
+        let mut costs = [0.0; small::SMALL + 1];
+        for (count, cost) in (0..).zip(&mut costs) {
+            *cost = settings.leaf_cost(count);
+        }
+        Self { settings, costs }
+    }
+
     /// Emits the subtree over `run`; `depth` is the number of pairs above it.
     fn child(&self, run: Run<'_>, centers: &Bounds, depth: usize, out: &mut Vec<Siblings>) -> Child {
         let count = run.refs.len();
         let halves = match self.settings.cut {
-            Cut::Sah | Cut::Fast if count <= small::SMALL => return small::build(self.settings, run, depth, out),
+            Cut::Sah | Cut::Fast if count <= small::SMALL => return small::build(self, run, depth, out),
             Cut::Median if count <= self.settings.leaf => return run.leaf(),
             Cut::Sah | Cut::Fast => self.binned(run.refs, centers),
             Cut::Median => spatial_median(run.refs),
@@ -235,20 +252,19 @@ impl Builder<'_> {
         let children = if count < TASK {
             [self.child(left, &centers[0], depth + 1, out), self.child(right, &centers[1], depth + 1, out)]
         } else {
-            let apart = |run, centers| {
-                let mut out = Vec::new();
-                let child = self.child(run, centers, depth + 1, &mut out);
-                (child, out)
-            };
-            let (first, second) = rayon::join(|| apart(left, &centers[0]), || apart(right, &centers[1]));
-            [append(out, first), append(out, second)]
+            let mut other = Vec::new();
+            let (first, second) = rayon::join(
+                || self.child(left, &centers[0], depth + 1, out),
+                || self.child(right, &centers[1], depth + 1, &mut other),
+            );
+            [first, append(out, second, &other)]
         };
         out[parent].children = children;
         Child::inner(parent)
     }
 
     fn binned(&self, refs: &mut [PrimRef], centers: &Bounds) -> Option<Halves> {
-        match self.settings.bins {
+        match self.settings.bins.min(LEAST_BINS.max(refs.len() / PER_BIN)) {
             bins @ ..=16 => binned::split::<16>(refs, centers, bins, self.settings),
             bins @ ..=32 => binned::split::<32>(refs, centers, bins, self.settings),
             bins => binned::split::<MAX_BINS>(refs, centers, bins, self.settings),
@@ -257,7 +273,7 @@ impl Builder<'_> {
 
     /// Cuts in the middle of the order by centre along the longest axis of the centres, then by number.
     fn median(&self, refs: &mut [PrimRef], centers: &Bounds) -> Halves {
-        let axis = centers.longest_axis();
+        let axis = centers.longest_axis() & 3;
         let middle = self.settings.half(refs.len());
         refs.select_nth_unstable_by(middle, |a, b| {
             a.center()[axis].total_cmp(&b.center()[axis]).then(a.id().cmp(&b.id()))
@@ -267,7 +283,7 @@ impl Builder<'_> {
             middle,
             axis,
             centers: [Bounds::of_centers(left), Bounds::of_centers(right)],
-            area: bounds::reduce(refs, Bounds::around, Bounds::union).half_area() as f32,
+            area: bounds::reduce(refs, Bounds::around, Bounds::union).half_area(),
         }
     }
 }
@@ -287,8 +303,14 @@ impl Settings {
 
     /// Cost of testing a leaf, per unit of area: blocks count, which hold one triangle where leaves do.
     #[inline(always)]
-    fn leaf_cost(&self, count: usize) -> f64 {
-        COST_BLOCK * count.div_ceil(self.leaf.min(BLOCK)) as f64
+    fn leaf_cost(&self, count: u32) -> f32 {
+        let blocks = match self.leaf {
+            1 => count,
+            2 => count.div_ceil(2),
+            3 => count.div_ceil(3),
+            _ => count.div_ceil(BLOCK as u32),
+        };
+        COST_BLOCK as f32 * blocks as f32
     }
 }
 
@@ -297,11 +319,14 @@ fn low_bits(axis: usize) -> u8 {
     axis as u8
 }
 
-/// Moves a subtree emitted apart behind what is there.
-fn append(out: &mut Vec<Siblings>, (child, part): (Child, Vec<Siblings>)) -> Child {
+/// Appends a subtree emitted apart.
+fn append(out: &mut Vec<Siblings>, child: Child, part: &[Siblings]) -> Child {
     let base = out.len();
-    let moved = |s: Siblings| Siblings { children: s.children.map(|c| c.moved(base)), ..s };
-    out.extend(part.into_iter().map(moved));
+    out.reserve(part.len());
+    for siblings in part {
+        let [first, second] = siblings.children;
+        out.push(Siblings { children: [first.moved(base), second.moved(base)], ..*siblings });
+    }
     child.moved(base)
 }
 
@@ -312,7 +337,19 @@ fn spatial_median(refs: &mut [PrimRef]) -> Option<Halves> {
         return None;
     }
     let axis = all.longest_axis();
-    let middle = all.center()[axis];
-    let (count, centers) = bounds::partition(refs, |r| r.center()[axis] < middle);
-    (count != 0 && count != refs.len()).then_some(Halves { middle: count, axis, centers, area: all.half_area() as f32 })
+    let (count, centers) = bounds::partition(refs, &Before { axis, middle: all.center()[axis] });
+    (count != 0 && count != refs.len()).then_some(Halves { middle: count, axis, centers, area: all.half_area() })
+}
+
+/// Chooses what lies before the middle of an axis.
+struct Before {
+    axis: usize,
+    middle: f32,
+}
+
+impl Choose for Before {
+    #[inline(always)]
+    fn chooses(&self, prim: &PrimRef) -> bool {
+        prim.center()[self.axis & 3] < self.middle
+    }
 }

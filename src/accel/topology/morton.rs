@@ -4,18 +4,13 @@
 //! Morton, "A Computer Oriented Geodetic Data Base", 1966: the codes. Departure: the number of a triangle stands in the same word as its code and
 //! takes no more bits than it must; what is left of 64 makes the grid, so that few triangles share a cell, and no two words are equal.
 
-#![expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "places in the grid are clamped; numbers are below 2^28"
-)]
+#![expect(clippy::cast_possible_truncation, reason = "numbers are below 2^28")]
 
-use glam::Vec3A;
 use rayon::prelude::*;
 
 use super::{
     CHUNK,
-    bounds::{Bounds, PrimRef, reduce},
+    bounds::{Bounds, PrimRef, greater, lesser, reduce},
 };
 use crate::simd::{Simd, SimdLevel, Task, dispatch};
 
@@ -67,7 +62,7 @@ impl Order {
 
 /// A grid of cubes around all centres.
 struct Grid {
-    low: Vec3A,
+    low: [f32; 3],
     scale: f32,
     last: f32,
     number_bits: u32,
@@ -80,11 +75,11 @@ impl Grid {
         let number_bits = usize::BITS - refs.len().leading_zeros();
         let axis_bits = ((u64::BITS - number_bits) / 3).min(MAX_AXIS_BITS);
         let cells = ((1_u32 << axis_bits) - 1) as f32;
-        let extent = (centers.max - centers.min).max_element();
+        let extent = centers.extent(0).max(centers.extent(1)).max(centers.extent(2));
         let scale = cells / extent;
         // An extent of 0, and one that is next to it, puts everything into one cell.
         let scale = if extent > 0.0 && scale.is_finite() { scale } else { 0.0 };
-        Self { low: centers.min, scale, last: cells, number_bits, axis_bits }
+        Self { low: centers.low(), scale, last: cells, number_bits, axis_bits }
     }
 
     /// The words of the triangles from number `first` on.
@@ -95,12 +90,11 @@ impl Grid {
         for words in words.chunks_mut(GROUP) {
             for i in 0..words.len() {
                 let prim = &refs[number + i];
-                let place = ((prim.center() - self.low) * self.scale).max(Vec3A::ZERO).min(Vec3A::splat(self.last));
-                let place = if prim.is_absent() { Vec3A::ZERO } else { place };
-                let place = place + Vec3A::splat(WHOLE);
-                places[0][i] = place.x.to_bits() & PLACE;
-                places[1][i] = place.y.to_bits() & PLACE;
-                places[2][i] = place.z.to_bits() & PLACE;
+                let (center, is_absent) = (prim.center(), prim.is_absent());
+                for axis in 0..3 {
+                    let place = lesser(greater((center[axis] - self.low[axis]) * self.scale, 0.0), self.last);
+                    places[axis][i] = if is_absent { 0 } else { (place + WHOLE).to_bits() & PLACE };
+                }
             }
             let mut codes = [0; GROUP];
             for i in 0..GROUP {

@@ -90,9 +90,12 @@ fn slots(count: usize) -> usize {
     count + SLACK * count.div_ceil(TASK)
 }
 
-/// Builds the topology; `None` where a path would be too long.
+/// Builds the topology; `None` without triangles, and where a path would be too long.
 pub(super) fn build(refs: &[PrimRef], settings: &Settings) -> Option<Topology> {
     let count = refs.len();
+    if count == 0 {
+        return None;
+    }
     let builder = Builder { settings, refs, curve: &Order::new(refs) };
     let mut leaves = vec![0; count];
     // Zeros come from the system when they are first needed, which for most of these is never.

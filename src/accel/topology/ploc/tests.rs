@@ -86,7 +86,7 @@ fn odd_places_make_valid_trees() {
         check(&growing(ratio).collect::<Vec<_>>(), &FAST);
         check(&growing(ratio).collect::<Vec<_>>(), &Settings { leaf: 1, ..FAST });
     }
-    for count in [1, 2, 16, 17, 64, 65, 129] {
+    for count in [0, 1, 2, 16, 17, 64, 65, 129] {
         check(&vec![Vec3::ONE; count], &FAST);
         check(&vec![Vec3::NAN; count], &FAST);
     }

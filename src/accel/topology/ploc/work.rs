@@ -6,7 +6,10 @@ use super::{Builder, Cluster, Merger, PIECE, Rest, Slots, packed};
 use crate::{
     accel::{
         sah::{BLOCK, COST_BLOCK, COST_TRAVERSE},
-        topology::{Child, Settings},
+        topology::{
+            Child, Settings,
+            bounds::{greater, lesser},
+        },
     },
     simd::prefetch,
 };
@@ -104,8 +107,7 @@ impl<'a> Work<'a> {
         }
         for i in 0..count {
             let number = builder.curve.number(first + i);
-            let bounds = builder.refs[number as usize].present_bounds();
-            let (low, high) = (bounds.min.to_array(), bounds.max.to_array());
+            let (low, high) = builder.refs[number as usize].corners();
             self.set_box(i, &low, &high);
             self.prims[i + OWN] = 1;
             self.areas[i] = half_area(&low, &high);
@@ -297,7 +299,7 @@ impl<'a> Work<'a> {
         let mut rest = Rest { area, cost, child, pairs, height };
         let mut is_leaf = false;
         if prims as usize <= self.settings.leaf {
-            let leaf_cost = area * self.settings.leaf_cost(prims as usize) as f32;
+            let leaf_cost = area * self.settings.leaf_cost(prims);
             is_leaf = leaf_cost <= cost;
             if is_leaf {
                 rest = Rest { cost: leaf_cost, pairs: 0, height: 0, ..rest };
@@ -322,15 +324,4 @@ fn half_area(low: &[f32; 3], high: &[f32; 3]) -> f32 {
 #[inline(always)]
 fn window(all: &[f32; PLACES], first: usize) -> &[f32; WINDOW] {
     all[first..].first_chunk().expect("places go on beyond the last cluster")
-}
-
-/// `f32::min` in one instruction.
-#[inline(always)]
-fn lesser(a: f32, b: f32) -> f32 {
-    if a < b { a } else { b }
-}
-
-#[inline(always)]
-fn greater(a: f32, b: f32) -> f32 {
-    if a > b { a } else { b }
 }
