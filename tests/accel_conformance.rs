@@ -30,7 +30,14 @@ fn build_spec(spec: &AccelSpec, mesh: &Mesh) -> AnyAccel {
 }
 
 /// Forms of structures beside the default ones, with kernels or builders of their own.
-const FORMS: [&str; 4] = ["ssh:planes=3", "ssh:planes=4", "bvh2:build=fast", "bvh8:build=fast"];
+const FORMS: [&str; 6] = [
+    "ssh:planes=3",
+    "ssh:planes=4",
+    "bvh2:build=fast",
+    "bvh8:build=fast",
+    "bvh8:layout=compact",
+    "bvh8:layout=compact,leaf=11",
+];
 
 /// Every structure but `list`, and the other forms.
 fn specs() -> Vec<AccelSpec> {

@@ -178,20 +178,8 @@ impl TriBlock {
             // No branch: it would wait for the block's memory, and what follows with it.
             *vertices = prims.indices[[prim, first][usize::from(prim == NO_PRIM)] as usize];
         }
-        let mut rows = [[Vec4::ZERO; 3]; 3];
-        let mut zero = Vec4::ZERO;
-        for (corner, rows) in rows.iter_mut().enumerate() {
-            let [a, b, c, d] = &vertices;
-            *rows = transposed([
-                extended(prims.positions, a[corner] as usize),
-                extended(prims.positions, b[corner] as usize),
-                extended(prims.positions, c[corner] as usize),
-                extended(prims.positions, d[corner] as usize),
-            ]);
-            // A product with 0 is 0 unless the factor is infinite or NaN.
-            zero += rows[0] * 0.0 + rows[1] * 0.0 + rows[2] * 0.0;
-        }
-        if zero != Vec4::ZERO {
+        let (rows, is_finite) = rows_of(&vertices, prims);
+        if !is_finite {
             return self.refit_odd(prims);
         }
         let [a, b, c] = &rows;
@@ -206,9 +194,7 @@ impl TriBlock {
         for (area, &prim) in areas.into_iter().zip(&self.prims) {
             own_area += if prim == NO_PRIM { 0.0 } else { f64::from(area) };
         }
-        for (corner, rows) in self.corners.iter_mut().zip(rows) {
-            *corner = [rows[0].to_array(), rows[1].to_array(), rows[2].to_array()];
-        }
+        self.set_corners(&rows);
         let least = Mat4::from_cols(low[0], low[1], low[2], low[2]).transpose();
         let most = Mat4::from_cols(high[0], high[1], high[2], high[2]).transpose();
         let min = least.x_axis.min(least.y_axis).min(least.z_axis.min(least.w_axis));
@@ -216,7 +202,26 @@ impl TriBlock {
         BlockBounds { aabb: Aabb { min: min.truncate(), max: max.truncate() }, own_area }
     }
 
-    /// As [`TriBlock::refit`], where a corner is not finite.
+    /// Becomes a block of these triangles, whose vertices are named as well; lanes without a triangle name those of another.
+    #[inline(always)]
+    pub(super) fn gather(&mut self, numbers: [u32; 4], vertices: &[[u32; 3]; 4], prims: &Triangles<'_>) {
+        self.prims = numbers;
+        let (rows, is_finite) = rows_of(vertices, prims);
+        if is_finite {
+            self.set_corners(&rows);
+        } else {
+            self.refit_odd(prims);
+        }
+    }
+
+    #[inline(always)]
+    fn set_corners(&mut self, rows: &[[Vec4; 3]; 3]) {
+        for (corner, rows) in self.corners.iter_mut().zip(rows) {
+            *corner = [rows[0].to_array(), rows[1].to_array(), rows[2].to_array()];
+        }
+    }
+
+    /// As [`TriBlock::refit`], where a corner may not be finite.
     #[cold]
     #[inline(never)]
     fn refit_odd(&mut self, prims: &Triangles<'_>) -> BlockBounds {
@@ -518,6 +523,24 @@ fn extended(positions: &[Vec3], vertex: usize) -> Vec4 {
         Some(four) => Vec4::from_slice(four),
         None => positions[vertex].extend(0.0),
     }
+}
+
+/// The corners of four triangles by axis, and whether they are finite; overflows of their sum aside.
+#[inline(always)]
+fn rows_of([a, b, c, d]: &[[u32; 3]; 4], prims: &Triangles<'_>) -> ([[Vec4; 3]; 3], bool) {
+    let mut rows = [[Vec4::ZERO; 3]; 3];
+    let mut sum = Vec4::ZERO;
+    for (corner, rows) in rows.iter_mut().enumerate() {
+        *rows = transposed([
+            extended(prims.positions, a[corner] as usize),
+            extended(prims.positions, b[corner] as usize),
+            extended(prims.positions, c[corner] as usize),
+            extended(prims.positions, d[corner] as usize),
+        ]);
+        sum += rows[0] + rows[1] + rows[2];
+    }
+    // A product with 0 is 0 unless the factor is infinite or NaN.
+    (rows, sum * 0.0 == Vec4::ZERO)
 }
 
 /// The first three rows of a matrix whose columns these are.

@@ -37,6 +37,18 @@ pub trait Simd: Copy + Send + Sync + 'static {
     /// The columns of eight records: number j of record i goes to lane i of row j.
     fn eight_columns(records: &[[f32; 8]; 8], to: &mut [[f32; 8]; 8]);
 
+    /// A quarter as many vertices as `F` has lanes, four lanes each, with any number in the fourth; `None` where one of them is the last of all or is none.
+    fn vertices(from: &[[f32; 3]], at: &[u32; 4]) -> Option<Self::F>;
+
+    /// `[1, 2, 0, 3]` in each four lanes.
+    fn rotated(numbers: Self::F) -> Self::F;
+
+    /// [`Lanes::min`] of all fours of lanes, for numbers that are not NaN.
+    fn least_four(numbers: Self::F) -> Self::F4;
+
+    /// [`Lanes::max`] of all fours of lanes, for numbers that are not NaN.
+    fn greatest_four(numbers: Self::F) -> Self::F4;
+
     /// Eight bytes as numbers.
     fn of_bytes(bytes: &[u8; 8]) -> Self::F8;
 
@@ -142,9 +154,6 @@ pub trait Halves: Lanes<Elem = f32> {
     /// `[2, 3, 2, 3]`.
     #[must_use]
     fn high_half(self) -> Self;
-    /// `[1, 2, 0, 3]`.
-    #[must_use]
-    fn rotated(self) -> Self;
     /// Lane 0.
     fn first(self) -> f32;
     /// Lane 1.

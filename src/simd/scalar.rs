@@ -49,6 +49,34 @@ impl Simd for Scalar {
     }
 
     #[inline(always)]
+    fn vertices(from: &[[f32; 3]], at: &[u32; 4]) -> Option<Self::F> {
+        let mut out = [0.0; 8];
+        for (out, &vertex) in out.as_chunks_mut::<4>().0.iter_mut().zip(at) {
+            let [[x, y, z], [next, ..]] = *from.get(vertex as usize..)?.first_chunk()?;
+            *out = [x, y, z, next];
+        }
+        Some(Array(out))
+    }
+
+    #[inline(always)]
+    fn rotated(numbers: Self::F) -> Self::F {
+        let [a, b, c, d, e, f, g, h] = numbers.0;
+        Array([b, c, a, d, f, g, e, h])
+    }
+
+    #[inline(always)]
+    fn least_four(numbers: Self::F) -> Self::F4 {
+        let [a, b, c, d, e, f, g, h] = numbers.0;
+        Array([a, b, c, d]).min(Array([e, f, g, h]))
+    }
+
+    #[inline(always)]
+    fn greatest_four(numbers: Self::F) -> Self::F4 {
+        let [a, b, c, d, e, f, g, h] = numbers.0;
+        Array([a, b, c, d]).max(Array([e, f, g, h]))
+    }
+
+    #[inline(always)]
     fn of_bytes(bytes: &[u8; 8]) -> Self::F8 {
         Array(bytes.map(f32::from))
     }
@@ -285,11 +313,6 @@ impl Halves for Array<f32, 4> {
     fn high_half(self) -> Self {
         let [_, _, c, d] = self.0;
         Self([c, d, c, d])
-    }
-    #[inline(always)]
-    fn rotated(self) -> Self {
-        let [a, b, c, d] = self.0;
-        Self([b, c, a, d])
     }
     #[inline(always)]
     fn first(self) -> f32 {

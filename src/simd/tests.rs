@@ -19,6 +19,11 @@ fn bits64(values: &[f64]) -> impl Iterator<Item = u64> + '_ {
     values.iter().map(|v| if v.is_nan() { u64::MAX } else { v.to_bits() })
 }
 
+/// A byte of each of eight numbers.
+fn words_of(numbers: &[f32]) -> [u8; 8] {
+    std::array::from_fn(|i| numbers[i].to_bits().to_le_bytes()[i % 4])
+}
+
 /// All operations on vectors of one type, over rows of 16 numbers; `zero` is any number.
 #[inline(always)]
 fn each<V: Lanes>(a: &[V::Elem], b: &[V::Elem], zero: V::Elem) -> (Vec<V::Elem>, u32, u32) {
@@ -112,6 +117,39 @@ impl Task for Operations<'_> {
                 let expected: Vec<f32> = records[first..][..S::F::LEN].iter().map(|record| record[j]).collect();
                 assert!(bits32(&row[..S::F::LEN]).eq(bits32(&expected)));
             }
+        }
+        let (records, mut rows) = (records.first_chunk().expect("sixteen"), [[0.0; 8]; 8]);
+        S::eight_columns(records, &mut rows);
+        for (j, row) in rows.iter().enumerate() {
+            assert!(bits32(row).eq(bits32(&records.map(|record| record[j]))));
+        }
+        let bytes = words_of(self.b);
+        assert_eq!(S::to_bytes(S::of_bytes(&bytes)), bytes);
+        let mut row = [0.0; 8];
+        S::of_bytes(&bytes).store(&mut row);
+        out.extend(bits32(&row));
+        let vertices: &[[f32; 3]] = self.a.as_chunks().0;
+        let finite: [f32; 16] = std::array::from_fn(|i| if self.a[i].is_nan() { 1.0 } else { self.a[i] + 0.0 });
+        for first in (0..4).step_by(S::F::LEN / 4) {
+            let at = [first, 3 - first, 2, 1];
+            let rotated = S::vertices(vertices, &at).map(S::rotated).expect("not the last");
+            let mut row = [0.0; 16];
+            rotated.store(&mut row);
+            for (four, at) in row[..S::F::LEN].as_chunks::<4>().0.iter().zip(at) {
+                let at = 3 * at as usize;
+                assert!(bits32(four).eq(bits32(&[self.a[at + 1], self.a[at + 2], self.a[at], self.a[at + 3]])));
+            }
+        }
+        for last in [4, 5, u32::MAX] {
+            assert!(S::vertices(vertices, &[0, last, 0, 0]).is_none());
+        }
+        let (mut low, mut high) = ([0.0; 4], [0.0; 4]);
+        S::least_four(S::F::load(&finite)).store(&mut low);
+        S::greatest_four(S::F::load(&finite)).store(&mut high);
+        for (lane, (low, high)) in low.into_iter().zip(high).enumerate() {
+            let column = finite[..S::F::LEN].iter().skip(lane).step_by(4);
+            assert!(column.clone().all(|&x| low <= x && x <= high));
+            assert!(column.clone().any(|&x| x == low) && column.clone().any(|&x| x == high));
         }
         let mut ends = [f32::INFINITY, f32::NEG_INFINITY];
         for first in (0..16).step_by(S::F::LEN) {

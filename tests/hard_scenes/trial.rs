@@ -167,9 +167,9 @@ pub(crate) struct Candidate {
 pub(crate) fn candidates(mesh: &Mesh, refitted: bool) -> Vec<Candidate> {
     let mut all = Vec::new();
     let specs = AccelKind::ALL.iter().map(|&kind| AccelSpec::new(kind));
-    let flat = "events:form=flat".parse().expect("a setting of events");
+    let others = ["events:form=flat", "bvh8:layout=compact"].map(|spec| spec.parse().expect("known settings"));
     let elsewhere = displaced(mesh);
-    for spec in specs.chain([flat]).filter(|spec| is_wanted(spec.kind())) {
+    for spec in specs.chain(others).filter(|spec| is_wanted(spec.kind())) {
         let kind = spec.kind();
         let slow = kind == AccelKind::List || spec.to_string().contains("flat");
         let fresh = spec.build(&mesh.prims()).expect("the mesh builds");

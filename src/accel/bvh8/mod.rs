@@ -1,16 +1,19 @@
 //! Hierarchy of boxes with eight children a node, tested at once.
 //!
 //! A node holds its children's boxes in structure-of-arrays form and where they are, in 224 bytes. Leaves are runs of blocks of four triangles.
-//! Nodes and blocks stand in depth-first order, so that a subtree owns a contiguous run of each: a refit takes new positions into both in one sweep
-//! from the leaves upward, and subtrees are refitted in parallel without sharing.
+//! Nodes and leaves stand in depth-first order, so that a subtree owns a contiguous run of each: a refit takes new positions into both in one sweep
+//! from the leaves upward, and subtrees are refitted in parallel without sharing. With `layout=compact` a node takes 96 bytes and leaves name vertices
+//! instead of holding them.
 //!
 //! # Source
 //! Wald, Benthin and Boulos, "Getting Rid of Packets", 2008, for nodes of many children against one ray; Ylitie, Karras and Laine, "Efficient Incoherent
-//! Ray Traversal on GPUs Through Compressed Wide BVHs", 2017, for the choice of the nodes. Departure: rays that lie close together go in packets,
-//! packets of rays that point apart share the top of the tree (`crown.rs`), and of many single rays several are in flight (`stream.rs`).
+//! Ray Traversal on GPUs Through Compressed Wide BVHs", 2017, for the choice of the nodes and the boxes of the compact layout. Departure: rays that lie close together go in
+//! packets, packets of rays that point apart share the top of the tree (`crown.rs`), and of many single rays several are in flight (`stream.rs`), in the full layout;
+//! steps are read as planes before rays are tested, so that the proof is the one of full boxes.
 //!
-//! Cost: build O(n log n) and refit O(n) on the current rayon pool; a block takes 160 bytes. Choose it for rays.
+//! Cost: build O(n log n) and refit O(n) on the current rayon pool; a block takes 160 bytes. Choose it for rays, and the compact layout where memory or refits count more.
 
+mod compact;
 mod crown;
 mod format;
 mod full;
@@ -29,6 +32,7 @@ use crate::{
     geom::{Aabb, Forms, Hit, Ray, Triangles},
     simd::Simd,
 };
+use compact::Compact;
 pub(super) use full::Full;
 pub(super) use tree::Tree8;
 
@@ -40,6 +44,7 @@ pub struct Bvh8(Form);
 #[derive(Debug)]
 enum Form {
     Full(Tree8<Full>),
+    Compact(Tree8<Compact>),
 }
 
 /// One expression for the tree of any layout.
@@ -47,20 +52,34 @@ macro_rules! of_form {
     ($form:expr, $tree:ident => $value:expr) => {
         match $form {
             Form::Full($tree) => $value,
+            Form::Compact($tree) => $value,
         }
     };
 }
 
 impl Clone for Bvh8 {
     fn clone(&self) -> Self {
-        Self(match &self.0 {
-            Form::Full(tree) => Form::Full(tree.clone()),
-        })
+        Self(self.0.clone())
     }
 
     fn clone_from(&mut self, source: &Self) {
-        match (&mut self.0, &source.0) {
-            (Form::Full(tree), Form::Full(source)) => tree.clone_from(source),
+        self.0.clone_from(&source.0);
+    }
+}
+
+impl Clone for Form {
+    fn clone(&self) -> Self {
+        match self {
+            Self::Full(tree) => Self::Full(tree.clone()),
+            Self::Compact(tree) => Self::Compact(tree.clone()),
+        }
+    }
+
+    fn clone_from(&mut self, source: &Self) {
+        match (&mut *self, source) {
+            (Self::Full(tree), Self::Full(source)) => tree.clone_from(source),
+            (Self::Compact(tree), Self::Compact(source)) => tree.clone_from(source),
+            _ => *self = source.clone(),
         }
     }
 }
@@ -71,6 +90,7 @@ impl Bvh8 {
     pub(super) fn full(&self) -> Option<&Tree8<Full>> {
         match &self.0 {
             Form::Full(tree) => Some(tree),
+            Form::Compact(_) => None,
         }
     }
 }
@@ -81,12 +101,15 @@ pub enum Layout {
     /// Boxes as they are, triangles by their corners.
     #[default]
     Full,
+    /// Boxes in steps of 8 bits, triangles by the numbers of their vertices: less than half the memory and much faster refits, slower rays.
+    Compact,
 }
 
 impl Layout {
     fn parse(value: &str) -> Result<Self, String> {
         match value {
             "full" => Ok(Self::Full),
+            "compact" => Ok(Self::Compact),
             _ => Err(format!("`{value}` is not one of full, compact")),
         }
     }
@@ -133,12 +156,18 @@ impl Accel for Bvh8 {
     fn build(prims: &Triangles<'_>, config: &Bvh8Config) -> Result<Self, BuildError> {
         Ok(Self(match config.layout {
             Layout::Full => Form::Full(Tree8::build(prims, config)?),
+            Layout::Compact => Form::Compact(Tree8::build(prims, config)?),
         }))
     }
 
     fn refit_into(&self, out: &mut Self, prims: &Triangles<'_>) -> Refit {
         match (&self.0, &mut out.0) {
             (Form::Full(tree), Form::Full(out)) => tree.refit_into(out, prims),
+            (Form::Compact(tree), Form::Compact(out)) => tree.refit_into(out, prims),
+            (form, other) => {
+                *other = form.clone();
+                self.refit_into(out, prims)
+            }
         }
     }
 

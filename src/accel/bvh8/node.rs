@@ -24,6 +24,10 @@ const LEAF: u32 = 1 << 31;
 const COUNT_SHIFT: u32 = 28;
 const FIRST: u32 = (1 << COUNT_SHIFT) - 1;
 
+const RUN_SHIFT: u32 = 26;
+const FIRST_OF_RUN: u32 = (1 << RUN_SHIFT) - 1;
+const _: () = assert!(MAX_LEAF <= 1 << (31 - RUN_SHIFT));
+
 /// Where a child is: a node, a run of blocks, or nowhere.
 ///
 /// Bit 31 marks a leaf; bits 28..31 are its block count less one, bits 0..28 its first block.
@@ -42,6 +46,22 @@ impl Link {
     pub(super) fn leaf(first: usize, count: usize) -> Self {
         debug_assert!((1..=MAX_LEAF_BLOCKS).contains(&count) && first <= MAX_BLOCKS);
         Self(LEAF | ((count as u32 - 1) << COUNT_SHIFT) | first as u32)
+    }
+
+    /// Most triangles of a tree whose leaves are runs of triangles: 26 bits for the first, and the last number marks what is no child.
+    pub(super) const MOST_IN_RUNS: usize = (1 << RUN_SHIFT) - 2;
+
+    /// A leaf of so many triangles, at most [`MAX_LEAF`]: bits 26..31 are their count less one.
+    pub(super) fn run(first: usize, count: usize) -> Self {
+        debug_assert!((1..=MAX_LEAF).contains(&count) && first <= Self::MOST_IN_RUNS);
+        Self(LEAF | ((count as u32 - 1) << RUN_SHIFT) | first as u32)
+    }
+
+    /// The triangles of such a leaf.
+    #[inline(always)]
+    pub(super) fn triangles(self) -> Range<usize> {
+        let first = (self.0 & FIRST_OF_RUN) as usize;
+        first..first + ((self.0 & !LEAF) >> RUN_SHIFT) as usize + 1
     }
 
     #[inline(always)]

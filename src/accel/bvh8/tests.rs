@@ -2,52 +2,67 @@ use glam::Vec3;
 use proptest::prelude::*;
 
 use super::{
-    Bvh8, Bvh8Config,
+    Bvh8, Bvh8Config, Layout,
+    compact::Compact,
+    format::Format,
     full::Full,
     kernel::met,
-    node::{EightNode, Link, Node},
+    node::{EightNode, Link},
     packet::met_together,
 };
 use crate::{
-    accel::{Accel, AccelKind, AnyHit, Closest, Forms, PACKET, TravRay, slabs, wide::WIDTH},
+    accel::{
+        Accel, AccelKind, AnyHit, Closest, Forms, PACKET, TravRay, slabs,
+        wide::{WIDTH, refit::Store},
+    },
     geom::{Aabb, Hit, Ray, Triangles},
     simd::{Simd, SimdLevel, Task, dispatch},
 };
 
 /// The children that a ray meets by every f32 and f64 test of single rays and in a packet of its own kind.
-struct Met<'a> {
+struct Met<'a, F: Format> {
     ray: &'a TravRay,
-    node: &'a Node,
+    node: &'a F::Node,
     reach: f32,
 }
 
-impl Task for Met<'_> {
+impl<F: Format> Task for Met<'_, F> {
     type Output = [u32; 4];
 
     #[inline(always)]
     fn run<S: Simd>(self) -> [u32; 4] {
-        let [fast, wide] = met::<S, Full>(self.ray, self.node, self.reach);
-        let [all, each] = met_together::<S, Full>(self.ray, self.node, self.reach);
+        let [fast, wide] = met::<S, F>(self.ray, self.node, self.reach);
+        let [all, each] = met_together::<S, F>(self.ray, self.node, self.reach);
         [fast, wide, all, each]
     }
 }
 
 /// A node whose slots hold the box in turn with boxes that nothing meets.
-fn node(aabb: Aabb) -> Node {
-    let mut node = Node::new([Link::NONE; WIDTH]);
+fn node<F: Format>(aabb: Aabb) -> F::Node {
+    let mut node = F::Node::new([Link::NONE; WIDTH]);
     let mut aabbs = [Aabb::EMPTY; WIDTH];
     for aabbs in aabbs.chunks_mut(2) {
         aabbs[0] = aabb;
     }
-    node.set_aabbs(&aabbs);
+    let mut store = F::STORE;
+    store.store(0, &aabbs, &mut node);
     node
+}
+
+/// The children that a ray meets in a node of this box, in every layout.
+fn met_in(level: SimdLevel, ray: &TravRay, aabb: Aabb) -> [[u32; 4]; 2] {
+    let reach = aabb.reach();
+    [
+        dispatch(level, Met::<Full> { ray, node: &node::<Full>(aabb), reach }),
+        dispatch(level, Met::<Compact> { ray, node: &node::<Compact>(aabb), reach }),
+    ]
 }
 
 const HALF: u32 = 0b0101_0101;
 
 #[test]
 fn rays_that_pass_a_box_by_miss_it() {
-    let node = node(Aabb { min: Vec3::ZERO, max: Vec3::ONE });
+    let aabb = Aabb { min: Vec3::ZERO, max: Vec3::ONE };
     for level in SimdLevel::available() {
         for (origin, dir, due) in [
             (Vec3::new(0.3, 0.4, 5.0), Vec3::new(0.01, 0.02, -1.0), HALF),
@@ -56,11 +71,7 @@ fn rays_that_pass_a_box_by_miss_it() {
             (Vec3::new(0.5, 0.5, 0.5), Vec3::new(0.3, -0.2, 0.1), HALF),
         ] {
             let ray = TravRay::new(&Ray::new(origin, dir)).unwrap();
-            assert_eq!(
-                dispatch(level, Met { ray: &ray, node: &node, reach: 1.0 }),
-                [due; 4],
-                "{origin} {dir} at {level}"
-            );
+            assert_eq!(met_in(level, &ray, aabb), [[due; 4]; 2], "{origin} {dir} at {level}");
         }
     }
 }
@@ -85,7 +96,7 @@ proptest! {
         let ray = TravRay::new(&Ray { t_far: f32::from(t) * scale, ..Ray::new(origin, dir) }).unwrap();
         prop_assume!(slabs::fits(&ray, aabb.reach()));
         for level in SimdLevel::available() {
-            prop_assert_eq!(dispatch(level, Met { ray: &ray, node: &node(aabb), reach: aabb.reach() }), [HALF; 4], "{}", level);
+            prop_assert_eq!(met_in(level, &ray, aabb), [[HALF; 4]; 2], "{}", level);
         }
     }
 
@@ -109,10 +120,16 @@ proptest! {
         };
         prop_assume!(slabs::fits(&ray, aabb.reach()));
         for level in SimdLevel::available() {
-            let found = dispatch(level, Met { ray: &ray, node: &node(aabb), reach: aabb.reach() });
-            prop_assert_eq!(found, [HALF; 4], "{}", level);
+            prop_assert_eq!(met_in(level, &ray, aabb), [[HALF; 4]; 2], "{}", level);
         }
     }
+}
+
+/// The compact tree.
+fn compact(prims: &Triangles<'_>) -> Bvh8 {
+    let tree = Bvh8::build(prims, &Bvh8Config { layout: Layout::Compact, ..Bvh8Config::default() }).unwrap();
+    tree.validate(prims).unwrap();
+    tree
 }
 
 /// The closest hit of a ray and whether it is blocked, asked for by itself.
@@ -175,6 +192,7 @@ proptest! {
         let indices: Vec<_> = (0..).step_by(3).take(corners.len()).map(|i| [i, i + 1, i + 2]).collect();
         let prims = Triangles { positions: &positions, indices: &indices, topology_epoch: 0 };
         let tree = Bvh8::build(&prims, &Bvh8Config::default()).unwrap();
+        let compact = compact(&prims);
         // All from one point, or into one octant, or neither.
         let ray = |&(o, d, scale): &([i8; 3], [i8; 3], f32)| {
             let origin = point(start.unwrap_or(o));
@@ -185,6 +203,8 @@ proptest! {
         for level in SimdLevel::available() {
             for packet in [1, 5, PACKET] {
                 let (hits, blocked) = dispatch(level, Batch { tree: &tree, prims: &prims, rays: &rays, packet });
+                let other = dispatch(level, Batch { tree: &compact, prims: &prims, rays: &rays, packet });
+                prop_assert_eq!((&hits, &blocked), (&other.0, &other.1), "{} {}, compact", level, packet);
                 for (i, ray) in rays.iter().enumerate() {
                     let alone = TravRay::new(ray).map(|ray| dispatch(level, Alone { tree: &tree, prims: &prims, ray: &ray }));
                     prop_assert_eq!((hits[i], blocked[i]), alone.unwrap_or((None, false)), "{} {} {:?}", level, packet, ray);
@@ -219,6 +239,7 @@ proptest! {
         let indices: Vec<_> = (0..).step_by(3).take(triangles.len()).map(|i| [i, i + 1, i + 2]).collect();
         let prims = Triangles { positions: &positions, indices: &indices, topology_epoch: 0 };
         let tree = Bvh8::build(&prims, &Bvh8Config::default()).unwrap();
+        let compact = compact(&prims);
         let alone = |ray: &Ray, level| {
             let ray = TravRay::new(ray);
             ray.map_or((None, false), |ray| dispatch(level, Alone { tree: &tree, prims: &prims, ray: &ray }))
@@ -246,6 +267,8 @@ proptest! {
             let expected: Vec<_> = rays.iter().map(|ray| alone(ray, level)).collect();
             for packet in [1, PACKET] {
                 let (hits, blocked) = dispatch(level, Batch { tree: &tree, prims: &prims, rays: &rays, packet });
+                let other = dispatch(level, Batch { tree: &compact, prims: &prims, rays: &rays, packet });
+                prop_assert_eq!((&hits, &blocked), (&other.0, &other.1), "{} {}, compact", level, packet);
                 for (i, ray) in rays.iter().enumerate() {
                     prop_assert_eq!((hits[i], blocked[i]), expected[i], "{} {} {:?}", level, packet, ray);
                 }

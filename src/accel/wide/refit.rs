@@ -12,7 +12,7 @@ use crate::{
 };
 
 /// Subtrees of fewer nodes are refitted by one task.
-const TASK_NODES: usize = 512;
+pub(in crate::accel) const TASK_NODES: usize = 512;
 
 /// What a refit found out about a subtree. Sums are taken in the order of the tree, whatever the schedule.
 #[derive(Clone, Copy, Debug)]

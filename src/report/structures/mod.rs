@@ -53,8 +53,15 @@ impl Options {
 }
 
 /// Settings worth a row of their own, besides the defaults of every kind.
-const VARIANTS: [&str; 6] =
-    ["ssh:leaf=1", "ssh:refit=rechoose", "ssh:planes=3", "ssh:planes=4", "events:form=flat", "grug:mode=dda"];
+const VARIANTS: [&str; 7] = [
+    "bvh8:layout=compact",
+    "ssh:leaf=1",
+    "ssh:refit=rechoose",
+    "ssh:planes=3",
+    "ssh:planes=4",
+    "events:form=flat",
+    "grug:mode=dda",
+];
 
 /// Every structure with its default settings and, unless `quick`, variants that show a trade.
 pub fn specs(quick: bool) -> Vec<AccelSpec> {

@@ -4,8 +4,8 @@
 use std::arch::x86_64::*;
 
 use super::{
-    columns::{eight_columns, four_columns},
-    vectors::{F32x4, F32x8, F64x4, UPPER, least_of, widen},
+    columns::{ROTATED, eight_columns, four_columns, two_vertices},
+    vectors::{F32x4, F32x8, F64x4, UPPER, least_of, quarters, widen},
     words::{COMPRESS, keys, load_words, of_bytes, sort, store_words},
 };
 use crate::simd::{Lanes, Simd, SimdLevel, Task, dispatch::call_avx2};
@@ -49,6 +49,28 @@ impl Simd for Avx2 {
     #[inline(always)]
     fn eight_columns(records: &[[f32; 8]; 8], to: &mut [[f32; 8]; 8]) {
         eight_columns(records, to);
+    }
+
+    #[inline(always)]
+    fn vertices(from: &[[f32; 3]], at: &[u32; 4]) -> Option<F32x8> {
+        two_vertices(from, at[0], at[1])
+    }
+
+    #[inline(always)]
+    fn rotated(numbers: F32x8) -> F32x8 {
+        F32x8(call!(_mm256_permute_ps::<ROTATED>(numbers.0)))
+    }
+
+    #[inline(always)]
+    fn least_four(numbers: F32x8) -> F32x4 {
+        let (low, high) = quarters(numbers);
+        low.min(high)
+    }
+
+    #[inline(always)]
+    fn greatest_four(numbers: F32x8) -> F32x4 {
+        let (low, high) = quarters(numbers);
+        low.max(high)
     }
 
     #[inline(always)]

@@ -4,8 +4,8 @@
 use std::arch::x86_64::*;
 
 use super::{
-    columns::{HIGHS, LOWS, eight_columns, near_pair, write_columns},
-    vectors::{F32x4, F32x8, F32x16, F64x4, F64x8, halves, least_of, widen},
+    columns::{HIGHS, LOWS, ROTATED, eight_columns, near_pair, two_vertices, write_columns},
+    vectors::{F32x4, F32x8, F32x16, F64x4, F64x8, UPPER, halves, least_of, quarters, widen},
     words::{keys, load_words, of_bytes, sort, store_words},
 };
 use crate::simd::{Lanes, Simd, SimdLevel, Task, dispatch::call_avx512};
@@ -59,6 +59,31 @@ impl Simd for Avx512 {
     #[inline(always)]
     fn eight_columns(records: &[[f32; 8]; 8], to: &mut [[f32; 8]; 8]) {
         eight_columns(records, to);
+    }
+
+    #[inline(always)]
+    fn vertices(from: &[[f32; 3]], at: &[u32; 4]) -> Option<F32x16> {
+        let (low, high) = (two_vertices(from, at[0], at[1])?, two_vertices(from, at[2], at[3])?);
+        Some(F32x16(call!(_mm512_insertf32x8::<UPPER>(call!(_mm512_castps256_ps512(low.0)), high.0))))
+    }
+
+    #[inline(always)]
+    fn rotated(numbers: F32x16) -> F32x16 {
+        F32x16(call!(_mm512_permute_ps::<ROTATED>(numbers.0)))
+    }
+
+    #[inline(always)]
+    fn least_four(numbers: F32x16) -> F32x4 {
+        let (low, high) = halves(numbers);
+        let (low, high) = quarters(low.min(high));
+        low.min(high)
+    }
+
+    #[inline(always)]
+    fn greatest_four(numbers: F32x16) -> F32x4 {
+        let (low, high) = halves(numbers);
+        let (low, high) = quarters(low.max(high));
+        low.max(high)
     }
 
     #[inline(always)]

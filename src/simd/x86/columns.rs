@@ -60,3 +60,24 @@ pub(super) fn write_columns((a, b): (__m512, __m512), to: &mut [[f32; 16]; 8], c
     F32x16(call!(_mm512_shuffle_f32x4::<EVEN>(a, b))).store(&mut to[column]);
     F32x16(call!(_mm512_shuffle_f32x4::<ODD>(a, b))).store(&mut to[column + 4]);
 }
+
+/// Numbers of a vertex in another order of axes, in each four.
+pub(super) const ROTATED: i32 = 0b11_00_10_01;
+
+/// A vertex and a number of the next.
+#[inline(always)]
+fn vertex(from: &[[f32; 3]], at: u32) -> Option<__m128> {
+    let at = at as usize;
+    if at + 1 >= from.len() {
+        return None;
+    }
+    // SAFETY: the next vertex exists, so that many numbers follow; an unaligned load of the baseline.
+    Some(unsafe { _mm_loadu_ps(from.as_ptr().add(at).cast()) })
+}
+
+/// Two vertices, each with a number of the next.
+#[inline(always)]
+pub(super) fn two_vertices(from: &[[f32; 3]], first: u32, second: u32) -> Option<F32x8> {
+    let (low, high) = (vertex(from, first)?, vertex(from, second)?);
+    Some(F32x8(call!(_mm256_insertf128_ps::<UPPER>(call!(_mm256_castps128_ps256(low)), high))))
+}

@@ -222,6 +222,11 @@ pub(super) fn halves(numbers: F32x16) -> (F32x8, F32x8) {
     (F32x8(call!(_mm512_castps512_ps256(numbers.0))), F32x8(call!(_mm512_extractf32x8_ps::<UPPER>(numbers.0))))
 }
 
+#[inline(always)]
+pub(super) fn quarters(numbers: F32x8) -> (F32x4, F32x4) {
+    (F32x4(call!(_mm256_castps256_ps128(numbers.0))), F32x4(call!(_mm256_extractf128_ps::<UPPER>(numbers.0))))
+}
+
 /// The least of eight numbers.
 #[inline(always)]
 pub(super) fn least_of(numbers: F32x8) -> f32 {
@@ -249,11 +254,6 @@ impl Halves for F32x4 {
     #[inline(always)]
     fn high_half(self) -> Self {
         Self(call!(_mm_movehl_ps(self.0, self.0)))
-    }
-    #[inline(always)]
-    fn rotated(self) -> Self {
-        const ROTATED: i32 = 0b11_00_10_01;
-        Self(call!(_mm_shuffle_ps::<ROTATED>(self.0, self.0)))
     }
     #[inline(always)]
     fn first(self) -> f32 {
