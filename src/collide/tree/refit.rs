@@ -3,19 +3,13 @@
 use super::{LEAF, Tree, WIDTH, node::Ends};
 use crate::{
     geom::{Aabb, Triangles},
-    simd::{Simd, SimdLevel, Task, dispatch, prefetch},
+    simd::{Simd, SimdLevel, Task, dispatch},
 };
 
 /// Boxes by number.
 pub(in crate::collide) trait Boxes {
     /// A box; the empty one for those with NaN or without an inside.
     fn ends(&self, number: u32) -> Ends;
-    /// Asks for the memory that leads to a box's own.
-    #[inline(always)]
-    fn announce(&self, _number: u32) {}
-    /// Asks for the memory of a box, which was announced before.
-    #[inline(always)]
-    fn ask(&self, _number: u32) {}
 }
 
 impl<F: Fn(u32) -> Aabb> Boxes for F {
@@ -35,27 +29,7 @@ impl Boxes for Triangles<'_> {
         let c = self.positions[c as usize].extend(0.0);
         Ends { low: a.min(b).min(c), high: a.max(b).max(c) }
     }
-
-    #[inline(always)]
-    fn announce(&self, number: u32) {
-        prefetch(self.indices, number as usize);
-    }
-
-    #[inline(always)]
-    fn ask(&self, number: u32) {
-        if let Some(&[a, b, c]) = self.indices.get(number as usize) {
-            prefetch(self.positions, a as usize);
-            prefetch(self.positions, b as usize);
-            prefetch(self.positions, c as usize);
-        }
-    }
 }
-
-/// So many nodes ahead, corners of triangles are asked for.
-const ANNOUNCED: usize = 6;
-
-/// So many nodes ahead, vertices are.
-const ASKED: usize = 3;
 
 impl Tree {
     /// Takes the items' new boxes, as many as before. No allocation.
@@ -85,15 +59,6 @@ impl<B: Boxes> Task for Refit<'_, B> {
         let Self { tree, boxes } = self;
         let (mut areas, mut own) = (0.0_f64, 0.0_f64);
         for number in (0..tree.nodes.len()).rev() {
-            if let Some(far) = number.checked_sub(ANNOUNCED) {
-                let (far, near) = (&tree.nodes[far], &tree.nodes[far + ANNOUNCED - ASKED]);
-                if far.is_leaf {
-                    far.links[..far.count as usize].iter().for_each(|&link| boxes.announce(link));
-                }
-                if near.is_leaf {
-                    near.links[..near.count as usize].iter().for_each(|&link| boxes.ask(link));
-                }
-            }
             let (before, after) = tree.bounds.split_at_mut(number + 1);
             let node = &mut tree.nodes[number];
             let mut ends = [Ends::EMPTY; WIDTH];
