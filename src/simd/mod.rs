@@ -22,7 +22,7 @@ pub use dispatch::{Task, dispatch};
 pub use float_mode::{FloatModeError, check_float_mode};
 pub use lanes::{Halves, Lanes, Simd};
 pub use level::SimdLevel;
-pub use ordered::{LEAST_KEY, key_floor};
+pub use ordered::{LEAST_KEY, key_floor, last_key};
 pub use prefetch::{prefetch, prefetch_either};
 pub use scalar::{Array, Scalar};
 pub use stack::Stack;

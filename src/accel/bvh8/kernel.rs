@@ -70,10 +70,18 @@ impl Boxes {
         }
     }
 
-    /// Nothing beyond counts any more.
+    /// Nothing beyond counts any more. True where more did before.
     #[inline(always)]
-    pub(super) fn set_limit(&mut self, limit: f32) {
+    pub(super) fn set_limit(&mut self, limit: f32) -> bool {
+        let before = self.limit;
         self.limit = limit + SLACK;
+        self.limit < before
+    }
+
+    /// The greatest key whose [`key_floor`](crate::simd::key_floor) is within the limit.
+    #[inline(always)]
+    pub(super) fn last_key(&self) -> u32 {
+        crate::simd::last_key(self.limit)
     }
 
     /// False when what the ray enters there lies beyond the limit.

@@ -19,7 +19,7 @@ use crate::{
         wide::{Place, WIDTH},
     },
     geom::{Forms, Hit, Ray, Triangles},
-    simd::{Lanes, Simd, Task, key_floor, prefetch_either},
+    simd::{Lanes, Simd, Task, prefetch_either},
 };
 
 /// Rays in flight.
@@ -78,24 +78,39 @@ impl Flight {
 
     /// Puts a ray on its way.
     #[inline(always)]
-    fn begin(&mut self, wings: &[Wing; WINGS], wing: usize, lane: usize) {
+    fn begin<const IS_REST: bool>(&mut self, wings: &[Wing; WINGS], wing: usize, lane: usize) {
         let from = &wings[wing % WINGS];
         self.boxes.take(&from.rays, lane % PACKET);
         (self.wing, self.lane) = (wing, lane);
         self.len = from.rest.unload(lane % PACKET, &mut self.keys, &mut self.links);
+        if IS_REST {
+            self.prune();
+        }
+    }
+
+    /// Puts the next ray that has somewhere to go on its way; false when there is none.
+    #[inline(always)]
+    fn begin_next<const IS_REST: bool>(&mut self, waiting: &mut Waiting, wings: &[Wing; WINGS], used: usize) -> bool {
+        while let Some((wing, lane)) = waiting.next(wings, used) {
+            self.begin::<IS_REST>(wings, wing, lane);
+            if !IS_REST || self.len > 0 {
+                return true;
+            }
+        }
+        false
     }
 
     #[inline(always)]
     fn closest_step<S: Simd, const ASK: bool>(&mut self, tree: &Tree8<Full>, wings: &mut [Wing; WINGS]) {
         self.len -= 1;
-        let (key, link) = (self.keys[self.len], Link::from_bits(self.links[self.len]));
-        if !self.boxes.reaches(key_floor(key)) {
-            return;
-        }
+        let link = Link::from_bits(self.links[self.len]);
         if link.is_leaf() {
             let wing = &mut wings[self.wing % WINGS];
             S::call(ClosestLeaf { tree, link, wing, lane: self.lane % PACKET });
-            self.boxes.set_limit(wing.rays.t_cull[self.lane % PACKET]);
+            let limit = wing.rays.t_cull[self.lane % PACKET];
+            if self.boxes.set_limit(limit) {
+                self.prune();
+            }
             return;
         }
         let node = &tree.nodes[link.index()];
@@ -113,6 +128,19 @@ impl Flight {
     fn ask(&self, tree: &Tree8<Full>) {
         let link = Link::from_bits(self.links[self.len.saturating_sub(1)]);
         prefetch_either(link.is_leaf(), &tree.items, &tree.nodes, link.index());
+    }
+
+    /// Drops what the ray enters beyond its limit.
+    #[inline(always)]
+    fn prune(&mut self) {
+        let (last, mut kept) = (self.boxes.last_key(), 0);
+        for i in 0..self.len.min(MAX_STACK) {
+            let (key, link) = (self.keys[i], self.links[i]);
+            self.keys[kept] = key;
+            self.links[kept] = link;
+            kept += usize::from(key <= last);
+        }
+        self.len = kept;
     }
 
     /// True when the ray is blocked.
@@ -210,10 +238,7 @@ fn fly<S: Simd, const ANY: bool, const ASK: bool>(
     let mut waiting = Waiting { wing: 0, left: wings[0].rest.left };
     let mut slots = [0; IN_FLIGHT];
     let mut live = 0;
-    while live < IN_FLIGHT
-        && let Some((wing, lane)) = waiting.next(wings, used)
-    {
-        flights[live].begin(wings, wing, lane);
+    while live < IN_FLIGHT && flights[live].begin_next::<ASK>(&mut waiting, wings, used) {
         slots[live] = live;
         live += 1;
     }
@@ -228,15 +253,12 @@ fn fly<S: Simd, const ANY: bool, const ASK: bool>(
             } else {
                 flight.closest_step::<S, ASK>(tree, wings);
             }
-            if is_done || flight.len == 0 {
-                let Some((wing, lane)) = waiting.next(wings, used) else {
-                    live -= 1;
-                    slots.swap(at, live);
-                    continue;
-                };
-                flight.begin(wings, wing, lane);
+            if (is_done || flight.len == 0) && !flight.begin_next::<ASK>(&mut waiting, wings, used) {
+                live -= 1;
+                slots.swap(at, live);
+            } else {
+                at += 1;
             }
-            at += 1;
         }
     }
 }
