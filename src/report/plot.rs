@@ -237,7 +237,7 @@ fn draw_scatter(root: &Area<'_>, title: &str, scatter: &Scatter) -> Result<(), F
         of_kind.map(move |d| (d, (d.at.0, if d.at.1 > 0.0 { d.at.1 } else { floor })))
     };
     let all = [Line::new(0, "", points(true).chain(points(false)).map(|p| p.1).collect())];
-    let [x, y] = [decades(&all, |p| p.0), decades(&all, |p| p.1)];
+    let [x, y] = [roomy(&all, |p| p.0), roomy(&all, |p| p.1)];
     let plot = begin(root, title, &scatter_legend())?;
     let mut chart = axes(&plot, (x.0..x.1).log_scale(), y)?;
     let upward = |y: &f64| if *y <= floor * 1.01 { "0".to_owned() } else { short(*y) };
@@ -368,6 +368,15 @@ fn decades(lines: &[Line], value: impl Fn(&(f64, f64)) -> f64) -> (f64, f64) {
     (libm::pow(10.0, first).min(low), libm::pow(10.0, last).max(high))
 }
 
+/// As [`decades`], and a third of one more at an end where a value lies: marks on an axis are hard to see.
+fn roomy(lines: &[Line], value: impl Fn(&(f64, f64)) -> f64) -> (f64, f64) {
+    let (low, high) = decades(lines, &value);
+    let values = || lines.iter().flat_map(|l| &l.points).map(&value).filter(|&v| drawable(v));
+    let first = if values().any(|v| v < low * 1.3) { low / 2.0 } else { low };
+    let last = if values().any(|v| v > high / 1.3) { high * 2.0 } else { high };
+    (first, last)
+}
+
 /// A number in few characters.
 fn short(x: f64) -> String {
     for (unit, name) in [(1e9, "G"), (1e6, "M"), (1e3, "k")] {
@@ -393,6 +402,13 @@ mod tests {
         assert_eq!(decades(&line(&[(1.0, 3.0), (2.0, 450.0)]), |p| p.1), (1.0, 1000.0));
         assert_eq!(decades(&line(&[(1.0, 0.0), (2.0, f64::NAN)]), |p| p.1), (1.0, 10.0));
         assert_eq!(decades(&line(&[(1.0, 100.0)]), |p| p.1), (100.0, 1000.0));
+    }
+
+    #[test]
+    fn no_value_lies_on_an_axis_with_room() {
+        let line = |points: &[(f64, f64)]| vec![Line::new(0, "a", points.to_vec())];
+        assert_eq!(roomy(&line(&[(1.0, 3.0), (2.0, 450.0)]), |p| p.1), (1.0, 1000.0));
+        assert_eq!(roomy(&line(&[(1.0, 1.0), (2.0, 100.0)]), |p| p.1), (0.5, 200.0));
     }
 
     #[test]

@@ -162,9 +162,9 @@ mod tests {
     fn a_class_beyond_the_aim_is_named_and_the_fastest_of_any_structure_counts() {
         let fast = Forms::from(Precision::Fast);
         let rows = [
-            row("bvh2", RayClass::Primary, Forms::EXACT, 1.3),
-            row("bvh2", RayClass::Primary, fast, 1.2),
-            row("bvh8", RayClass::Primary, Forms::EXACT, 1.2),
+            row("bvh2", RayClass::Primary, Forms::EXACT, 2.0),
+            row("bvh2", RayClass::Primary, fast, 1.0),
+            row("bvh8", RayClass::Primary, Forms::EXACT, 1.25),
             row("bvh8", RayClass::Primary, fast, 1.0),
             row("bvh2", RayClass::Ao, Forms::EXACT, 1.0),
             row("bvh2", RayClass::Ao, fast, 1.0),
@@ -172,11 +172,11 @@ mod tests {
         ];
         let costs = costs(&rows);
         assert_eq!(costs.len(), 2);
-        assert_eq!((costs[0].over_fastest.clone(), costs[0].is_within()), (vec![1.2], Some(false)));
-        assert_eq!(costs[0].over_fast, [1.3 / 1.2, 1.2]);
+        assert_eq!((costs[0].over_fastest.clone(), costs[0].is_within()), (vec![1.25], Some(false)));
+        assert_eq!(costs[0].over_fast, [1.25, 2.0]);
         assert_eq!((costs[1].over_fastest.clone(), costs[1].is_within()), (vec![1.0], Some(true)));
         let said = in_short(&rows).unwrap();
-        assert!(said.contains("missed by primary rays, single (1.20)."), "{said}");
+        assert!(said.contains("missed by primary rays, single (1.25)."), "{said}");
         assert!(in_short(&rows[4..]).unwrap().contains("kept"));
         assert_eq!(in_short(&[]), None);
     }

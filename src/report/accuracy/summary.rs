@@ -26,7 +26,7 @@ pub(super) fn summary(rows: &[RayRow], others: &[String]) -> Vec<String> {
          triangle that is not the first. No wrong answer in n rays does not mean none ever: the *at most* column is the rate that \
          a run like this rules out with 95 % confidence. Errors of t are in u = 2^-24 of t (a correct rounding errs by at most 1). \
          The table of structures gives the same by point, over all scenes; by scene and class of rays it stands in `accuracy.json`. The plots set cost against error; points that another one \
-         beats in both are grey."
+         beats in both are grey, and one that never erred stands at the rate that its rays rule out."
             .to_owned(),
     ]
 }
