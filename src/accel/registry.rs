@@ -341,6 +341,13 @@ impl AccelSpec {
         self.kind
     }
 
+    /// This specification with `build=fast`; `None` where a builder is named already, and for structures that have no such one.
+    #[must_use]
+    pub fn fast(&self) -> Option<Self> {
+        let is_free = self.settings.iter().all(|(key, _)| key != "build");
+        is_free.then(|| self.clone().with("build", "fast").ok()).flatten()
+    }
+
     /// Builds over `prims`, in the current rayon pool.
     ///
     /// # Errors

@@ -29,6 +29,8 @@ pub(super) struct Job {
     pub(super) frame: u64,
     /// The tree is to be swapped in only if it is no worse than the one in use.
     pub(super) on_trial: bool,
+    /// A tree that is ready soon is wanted more than a good one.
+    pub(super) is_fast: bool,
     /// Panic instead of building.
     #[cfg(test)]
     pub(super) panic: bool,
@@ -52,6 +54,8 @@ pub(super) struct Built {
     pub(super) frame: u64,
     /// As the job's, of trees that are ahead.
     pub(super) on_trial: bool,
+    /// It was built by the fast builder.
+    pub(super) is_fast: bool,
 }
 
 /// Why a job gave no tree.
@@ -64,18 +68,22 @@ pub(super) enum Failure {
 /// The thread and what it builds with. Dropping it waits for the build under way, if any, and no more.
 pub(super) type Builder = Worker<Job, Outcome>;
 
-/// Starts the thread, which builds what `spec` says.
+/// Starts the thread, which builds what `spec` says, or in haste what its fast form says.
 pub(super) fn start(spec: Arc<AccelSpec>) -> std::io::Result<Builder> {
+    let fast = spec.fast();
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(1)
         .thread_name(|_| "kinora-build".to_owned())
         .build()
         .map_err(std::io::Error::other)?;
     let mut expected = Vec::new();
-    Worker::start("kinora-rebuild", move |job| run(&pool, &spec, job, &mut expected))
+    Worker::start("kinora-rebuild", move |job: Job| {
+        let fast = fast.as_ref().filter(|_| job.is_fast);
+        run(&pool, fast.unwrap_or(&spec), fast.is_some(), job, &mut expected)
+    })
 }
 
-fn run(pool: &rayon::ThreadPool, spec: &AccelSpec, job: Job, expected: &mut Vec<Vec3>) -> Outcome {
+fn run(pool: &rayon::ThreadPool, spec: &AccelSpec, is_fast: bool, job: Job, expected: &mut Vec<Vec3>) -> Outcome {
     let prims = job.layout.indices.len();
     let _span = tracing::info_span!("rebuild", frame = job.frame, accel = spec.kind().name(), prims).entered();
     let epoch = job.layout.topology_epoch;
@@ -96,6 +104,7 @@ fn run(pool: &rayon::ThreadPool, spec: &AccelSpec, job: Job, expected: &mut Vec<
         Ok(Ok(accel)) => Ok(Built {
             accel,
             on_trial: job.on_trial && before.is_some(),
+            is_fast,
             positions: before.is_none().then_some(job.positions),
             frame: job.frame,
         }),

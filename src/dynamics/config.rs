@@ -81,6 +81,8 @@ pub struct LoopCounts {
     pub builds: u64,
     /// Rebuilds handed to the background builder.
     pub rebuilds_begun: u64,
+    /// Those of them that were to be ready soon rather than good: what moves fast gets trees of the fast builder.
+    pub fast_rebuilds: u64,
     /// Rebuilt trees swapped in.
     pub swaps: u64,
     /// Levels over groups brought to a frame, by a refit or anew; a frame in which no group moved keeps the one it has.

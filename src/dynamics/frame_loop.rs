@@ -31,9 +31,9 @@ const QUEUED_TRIANGLES: usize = 1 << 16;
 /// waits for the background build under way, if any.
 pub struct FrameLoop {
     config: FrameConfig,
-    spec: Arc<AccelSpec>,
+    pub(super) spec: Arc<AccelSpec>,
     top: TopKind,
-    stage: Stage,
+    pub(super) stage: Stage,
     builder: Option<Builder>,
     worlds: Pool<World>,
     counts: LoopCounts,
@@ -289,6 +289,7 @@ impl FrameLoop {
         {
             job.panic = std::mem::take(&mut self.panic_in_next_rebuild);
         }
+        self.counts.fast_rebuilds += u64::from(job.is_fast);
         builder.send(job);
         self.counts.rebuilds_begun += 1;
         Ok(())

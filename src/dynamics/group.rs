@@ -20,6 +20,18 @@ use crate::{
     world::GroupFrame,
 };
 
+/// How many times as fast the fast builder is, about.
+const FAST_GAIN: u64 = 3;
+
+/// By how much rays at its trees are dearer.
+const FAST_COST: f64 = 1.15;
+
+/// Frames that a rebuild takes when nobody knows.
+const UNKNOWN_LAG: u64 = 8;
+
+/// Decay during the build of a good tree from which on a fast one is better: that is ready in a third of the time and has decayed by a third.
+const HASTE: f64 = 0.2;
+
 /// A group of the loop: its vertices and structure of the last frame, and buffers for the next one.
 #[derive(Debug)]
 pub(super) struct Group {
@@ -42,6 +54,10 @@ pub(super) struct Group {
     before: Option<Arc<Vec<Vec3>>>,
     /// Frames that the last background rebuild took.
     lag: u64,
+    /// Frames that one by the builder of good trees takes, if that is known.
+    full_lag: Option<u64>,
+    /// The structure was built by the fast builder.
+    is_fast: bool,
     /// Trees of clips that are known.
     phases: Vec<Phases>,
     /// The clip that plays in the frame being made.
@@ -103,6 +119,8 @@ impl Group {
             built_of: 0,
             before: None,
             lag: 0,
+            full_lag: None,
+            is_fast: false,
             phases: Vec::new(),
             playing: None,
             phase: None,
@@ -232,6 +250,7 @@ impl Group {
                 if cost(&self.accel) < cost(&swapped) {
                     // The next one is built for where vertices are.
                     self.lag = 0;
+                    self.note_lag(lag, built.is_fast);
                     return Ok(Work { dropped: 1, ..work });
                 }
                 self.accel = swapped;
@@ -240,11 +259,19 @@ impl Group {
         };
         self.built_of = built.frame;
         self.lag = lag;
+        self.note_lag(lag, built.is_fast);
+        // A structure that could not be refitted was built anew, as it is first.
+        self.is_fast = built.is_fast && work.builds == 0;
         self.phase = None;
         if base.refits() {
             self.accel_pool.keep(base);
         }
         Ok(Work { swaps: 1, ..work })
+    }
+
+    /// Notes how many frames a rebuild took.
+    fn note_lag(&mut self, lag: u64, is_fast: bool) {
+        self.full_lag = Some(if is_fast { lag.max(1) * FAST_GAIN } else { lag.max(1) });
     }
 
     fn refit(&mut self, from: &Arc<AnyAccel>, spec: &AccelSpec, frame: u64) -> Result<Work, FrameError> {
@@ -270,6 +297,7 @@ impl Group {
         }
         self.accel = Some(accel);
         self.moved_since_build = false;
+        self.is_fast = false;
         self.built_of = frame;
         Ok(Work { builds: 1, ..Work::default() })
     }
@@ -289,6 +317,24 @@ impl Group {
         self.accel.as_ref().map_or(1.0, |accel| accel.decay())
     }
 
+    /// The same beside what a good tree would cost. A fast one is never good, even if it was built for a motion that would have been worse for it.
+    pub(super) fn excess(&self) -> f64 {
+        if self.is_fast { self.quality().max(1.0) * FAST_COST } else { self.quality() }
+    }
+
+    /// True while the tree in use is not what this motion, or rest, calls for.
+    #[cfg(test)]
+    pub(super) fn wants_good_tree(&self) -> bool {
+        self.is_fast || self.is_rebuilding() || self.quality() > 1.1
+    }
+
+    /// True when a good tree would be too old once it is ready: when it decays by more until then than a fast one is worse.
+    #[expect(clippy::cast_precision_loss, reason = "few frames")]
+    fn is_hasty(&self, frame: u64) -> bool {
+        let per_frame = (self.quality() - 1.0) / self.tree_age(frame).max(1) as f64;
+        per_frame * self.full_lag.unwrap_or(UNKNOWN_LAG) as f64 > HASTE
+    }
+
     /// Frames between `frame` and the one that the structure was built from; 0 when nothing moved since.
     pub(super) fn tree_age(&self, frame: u64) -> u64 {
         if self.moved_since_build && self.rigid.is_none() { frame - self.built_of } else { 0 }
@@ -297,7 +343,7 @@ impl Group {
     /// True when a background rebuild could improve the structure.
     pub(super) fn wants_rebuild(&self) -> bool {
         self.rigid.is_none()
-            && self.moved_since_build
+            && (self.moved_since_build || self.is_fast)
             && self.phase.is_none()
             && self.triangle_count() > 0
             && matches!(self.rebuild, Rebuild::Idle)
@@ -328,19 +374,36 @@ impl Group {
         self.shape.layout.indices.len()
     }
 
+    /// Frames that a rebuild is expected to take; 0 where that is not known, or where the last one was of no use.
+    fn lag_of(&self, is_fast: bool) -> u64 {
+        match self.full_lag {
+            Some(full) if self.lag > 0 => {
+                if is_fast {
+                    full.div_ceil(FAST_GAIN)
+                } else {
+                    full
+                }
+            }
+            _ => 0,
+        }
+    }
+
     /// The rebuild job of this frame's geometry, noted as begun. It is to be swapped in after `lag` frames, if that is known.
     ///
     /// The tree will be in use from its swap to the next one, about as many frames later, so it is built for the middle of these.
     #[expect(clippy::cast_precision_loss, reason = "few frames")]
     pub(super) fn begin_rebuild(&mut self, frame: u64, lag: Option<u64>) -> Job {
         self.rebuild = Rebuild::Begun;
+        // What is swapped in at given frames is to be the same whatever the timing.
+        let is_fast = lag.is_none() && self.is_hasty(frame);
         Job {
             layout: self.shape.layout.clone(),
             positions: self.positions.clone(),
             before: self.before.take(),
-            ahead: 1.5 * lag.unwrap_or(self.lag).min(1000) as f32,
+            ahead: 1.5 * lag.unwrap_or(self.lag_of(is_fast)).min(1000) as f32,
             frame,
             on_trial: lag.is_none(),
+            is_fast,
             #[cfg(test)]
             panic: false,
         }

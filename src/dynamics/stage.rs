@@ -268,8 +268,8 @@ impl Stage {
     pub(super) fn most_decayed(&self, limit: f64) -> Option<usize> {
         let mut worst = (limit, None);
         for (number, group) in self.groups.iter().enumerate() {
-            if group.quality() > worst.0 && group.wants_rebuild() {
-                worst = (group.quality(), Some(number));
+            if group.excess() > worst.0 && group.wants_rebuild() {
+                worst = (group.excess(), Some(number));
             }
         }
         worst.1

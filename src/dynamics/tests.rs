@@ -1,10 +1,13 @@
 //! Tests that reach into the loop: other groupings, a builder that panics.
 
-use std::sync::Arc;
+use std::{
+    sync::Arc,
+    time::{Duration, Instant},
+};
 
 use glam::{DAffine3, DVec3, Vec3};
 
-use super::{FrameConfig, FrameError, FrameLoop, RebuildPolicy, grouping::Grouping, pool::Pool};
+use super::{FrameConfig, FrameError, FrameLoop, RebuildPolicy, builder::Built, grouping::Grouping, pool::Pool};
 use crate::{
     accel::PACKET,
     anim::ActiveClip,
@@ -198,4 +201,79 @@ fn a_panic_of_the_builder_is_an_error_of_one_frame() {
     let (world, _) = frames.advance(&[&at(0.2)]).unwrap();
     assert_eq!(world.triangle_count(), 50);
     assert_eq!(frames.counts().swaps, 0);
+}
+
+/// A tree that is swapped in on trial at the next frame, over the vertices of the last one or others of the same group.
+fn on_trial(frames: &mut FrameLoop, world: &World, positions: &[Vec3]) {
+    let group = &world.groups[0];
+    let accel = frames.spec.build(&group.layout.triangles(positions)).unwrap();
+    let frame = frames.counts().frames;
+    let built = Built { accel, positions: None, frame, on_trial: true, is_fast: false };
+    frames.stage.groups[0].end_rebuild(Some(built));
+}
+
+#[test]
+fn a_tree_on_trial_is_kept_only_where_it_is_no_worse_than_the_one_in_use() {
+    for accel in ["bvh2", "bvh8", "ssh"] {
+        let mut frames = FrameLoop::new(config(accel, RebuildPolicy::Refit)).unwrap();
+        frames.add(Arc::new(burst(2000)), DAffine3::IDENTITY);
+        let world = frames.advance(&[&at(0.0)]).unwrap().0;
+        let cost = |world: &World| world.groups[0].accel.stats().sah_cost;
+        let fresh = cost(&world);
+        let elsewhere: Vec<Vec3> = world.groups[0].positions.iter().rev().map(|p| Vec3::new(-p.y, p.z, p.x)).collect();
+        on_trial(&mut frames, &world, &elsewhere);
+        let world = frames.advance(&[&at(1e-6)]).unwrap().0;
+        let counts = frames.counts();
+        assert_eq!((counts.rebuilds_dropped, counts.swaps), (1, 0), "{accel}: built for a motion that did not come");
+        assert!(cost(&world) < 1.01 * fresh, "{accel}: {} after {fresh}", cost(&world));
+        // Half a second later the tree is worse than a new one.
+        let world = frames.advance(&[&at(0.5)]).unwrap().0;
+        let decayed = cost(&world);
+        let there = world.groups[0].positions.to_vec();
+        on_trial(&mut frames, &world, &there);
+        let world = frames.advance(&[&at(0.5 + 1e-6)]).unwrap().0;
+        let counts = frames.counts();
+        assert_eq!((counts.rebuilds_dropped, counts.swaps), (1, 1), "{accel}: the better tree");
+        assert!(cost(&world) < decayed, "{accel}: {} after {decayed}", cost(&world));
+        world.validate().unwrap();
+    }
+}
+
+/// Plays frames until there were so many swaps.
+fn until_swapped(frames: &mut FrameLoop, swaps: u64, time_s: impl Fn(u32) -> f64) {
+    let deadline = Instant::now() + Duration::from_secs(60);
+    let mut frame = 0;
+    while frames.counts().swaps < swaps {
+        assert!(Instant::now() < deadline, "no swap: {:?}", frames.counts());
+        frames.advance(&[&at(time_s(frame))]).unwrap();
+        frame += 1;
+    }
+}
+
+#[test]
+fn what_moves_fast_gets_trees_that_are_built_fast_and_good_ones_when_it_rests() {
+    let mut frames = FrameLoop::new(config("bvh8", RebuildPolicy::Async)).unwrap();
+    frames.add(Arc::new(burst(3000)), DAffine3::IDENTITY);
+    until_swapped(&mut frames, 2, |frame| f64::from(frame % 20) * 0.1);
+    let moving = frames.counts();
+    assert!(moving.fast_rebuilds > 0, "{moving:?}");
+    let deadline = Instant::now() + Duration::from_secs(60);
+    while frames.stage.groups[0].wants_good_tree() {
+        assert!(Instant::now() < deadline, "{:?}", frames.counts());
+        frames.advance(&[&at(0.7)]).unwrap();
+    }
+    let resting = frames.counts();
+    for _ in 0..20 {
+        frames.advance(&[&at(0.7)]).unwrap();
+    }
+    assert_eq!(frames.counts().rebuilds_begun, resting.rebuilds_begun, "nothing is left to do");
+    assert!(frames.last_frame().quality <= 1.1);
+}
+
+#[test]
+fn swaps_at_given_frames_are_of_good_trees() {
+    let mut frames = FrameLoop::new(config("bvh8", RebuildPolicy::SwapEvery(2))).unwrap();
+    frames.add(Arc::new(burst(1000)), DAffine3::IDENTITY);
+    until_swapped(&mut frames, 5, |frame| f64::from(frame % 20) * 0.1);
+    assert_eq!(frames.counts().fast_rebuilds, 0);
 }

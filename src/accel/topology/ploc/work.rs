@@ -22,7 +22,10 @@ const OWN: usize = WINDOW / 2;
 const NOT: [u32; WINDOW] = [u32::MAX, 0, 0, 0, 0, 0, 0, 0, u32::MAX, 0, 0, 0, 0, 0, 0, 0];
 
 /// How often leaves are merged. More rounds make fuller leaves of triangles that are farther apart, which costs more than it gains.
-const ROUNDS: usize = 4;
+const ROUNDS: usize = 2;
+
+/// In how many of them only neighbours next to each other count.
+const NEXT_ROUNDS: usize = 1;
 
 /// Places of clusters, and those around them that are looked at.
 const PLACES: usize = PIECE + WINDOW;
@@ -192,6 +195,26 @@ impl<'a> Work<'a> {
         }
     }
 
+    /// As [`Work::search`], among the clusters next to each.
+    #[inline(always)]
+    fn search_next(&mut self, most: u32) {
+        let mut keys = [u32::MAX; PIECE + 1];
+        let [lx, ly, lz] = &self.low;
+        let [hx, hy, hz] = &self.high;
+        for i in 0..PIECE {
+            let (own, next) = (i + OWN, i + OWN + 1);
+            let x = greater(hx[own], hx[next]) - lesser(lx[own], lx[next]);
+            let y = greater(hy[own], hy[next]) - lesser(ly[own], ly[next]);
+            let z = greater(hz[own], hz[next]) - lesser(lz[own], lz[next]);
+            let area = x * (y + z) + y * z;
+            let key = area.to_bits() & !PAIR | (own ^ next) as u32;
+            keys[i + 1] = if self.prims[own] + self.prims[next] > most { u32::MAX } else { key };
+        }
+        for i in 0..PIECE {
+            self.near[i] = keys[i].min(keys[i + 1]);
+        }
+    }
+
     /// The later cluster whose best neighbour a cluster is, if it is its own best one. A pair is asked for once.
     #[inline(always)]
     fn partner(&self, i: usize) -> Option<usize> {
@@ -207,9 +230,13 @@ impl<'a> Work<'a> {
     #[inline(always)]
     pub(super) fn merge_leaves(&mut self, leaves: &mut [u32], first: usize) {
         let most = self.settings.leaf.min(BLOCK) as u32;
-        for _ in 0..if most > 1 { ROUNDS } else { 0 } {
+        for round in 0..if most > 1 { ROUNDS } else { 0 } {
             let before = self.count;
-            self.search(most);
+            if round < NEXT_ROUNDS {
+                self.search_next(most);
+            } else {
+                self.search(most);
+            }
             let mut kept = 0;
             for i in 0..before {
                 if self.near[i] == GONE {
