@@ -92,7 +92,7 @@ const THREADS_HELP: &str = "Worker threads [default: KINORA_THREADS, else what t
 fn accel_help() -> String {
     format!(
         "Structure over triangles, with its settings: NAME[:key=value,...]; there are {}. bvh2, bvh8 and ssh take build=sah, \
-         build=fast (built several times as fast, rays 5 to 20 % slower) and build=median",
+         build=fast (built about three times as fast, rays 5 to 20 % slower) and build=median",
         AccelKind::names()
     )
 }

@@ -77,12 +77,6 @@ impl PrimRef {
         self.0.is_empty()
     }
 
-    /// The lower and the upper corner; 0 for a triangle that is never hit.
-    #[inline(always)]
-    pub(super) fn corners(&self) -> ([f32; 3], [f32; 3]) {
-        if self.is_absent() { ([0.0; 3], [0.0; 3]) } else { (self.0.low(), self.0.high()) }
-    }
-
     /// Twice the midpoint of the box; 0 for a triangle that is never hit.
     #[inline(always)]
     pub(super) fn center(&self) -> [f32; 4] {
@@ -125,11 +119,6 @@ impl Bounds {
         [self.0[0], self.0[1], self.0[2]]
     }
 
-    #[inline(always)]
-    pub(super) fn high(&self) -> [f32; 3] {
-        [-self.0[4], -self.0[5], -self.0[6]]
-    }
-
     /// The box around all.
     #[inline(always)]
     pub(super) fn around(refs: &[PrimRef]) -> Self {
@@ -146,17 +135,6 @@ impl Bounds {
         let mut all = Self::EMPTY;
         for prim in refs {
             all = all.grown(prim.center());
-        }
-        all
-    }
-
-    /// The same, without triangles that are never hit.
-    pub(super) fn of_present_centers(refs: &[PrimRef]) -> Self {
-        let mut all = Self::EMPTY;
-        for prim in refs {
-            if !prim.is_absent() {
-                all = all.grown(prim.center());
-            }
         }
         all
     }
@@ -212,27 +190,52 @@ impl Bounds {
     }
 }
 
-/// Makes coordinates ordinary where they are not, so that areas neither overflow nor vanish.
-pub(super) fn normalize(refs: &mut [PrimRef]) {
-    let of = |refs: &[PrimRef]| {
-        let mut reach = [0.0; 8];
+/// Makes coordinates ordinary where they are not, so that areas neither overflow nor vanish; the box of the centres of triangles that may be hit.
+pub(super) fn normalize(refs: &mut [PrimRef]) -> Bounds {
+    let measure = |refs: &mut [PrimRef]| reduce(refs, Extent::of, Extent::union);
+    let found = measure(refs);
+    let reach = found.reach();
+    if reach == 0.0 || ORDINARY.contains(&reach) {
+        return found.centers;
+    }
+    // The power of two with the negative exponent, or next to it: digits stay as they are.
+    let exponent = reach.max(f32::MIN_POSITIVE).to_bits() & (255 << 23);
+    let factor = f32::from_bits((254 << 23) - exponent).max(f32::MIN_POSITIVE);
+    refs.par_iter_mut().for_each(|r| *r = r.scaled(factor));
+    measure(refs).centers
+}
+
+/// Where triangles that may be hit are.
+struct Extent {
+    /// Greatest absolute numbers of their boxes, and of their words.
+    most: [f32; 8],
+    centers: Bounds,
+}
+
+impl Extent {
+    fn of(refs: &[PrimRef]) -> Self {
+        let mut out = Self { most: [0.0; 8], centers: Bounds::EMPTY };
         for prim in refs {
             if !prim.is_absent() {
                 for lane in 0..8 {
-                    reach[lane] = greater(reach[lane], prim.0.0[lane].abs());
+                    out.most[lane] = greater(out.most[lane], prim.0.0[lane].abs());
                 }
+                out.centers = out.centers.grown(prim.center());
             }
         }
-        // Without the word.
-        reach[3] = 0.0;
-        reach.into_iter().fold(0.0, f32::max)
-    };
-    let reach = reduce(refs, of, f32::max);
-    if reach > 0.0 && !ORDINARY.contains(&reach) {
-        // The power of two with the negative exponent, or next to it: digits stay as they are.
-        let exponent = reach.max(f32::MIN_POSITIVE).to_bits() & (255 << 23);
-        let factor = f32::from_bits((254 << 23) - exponent).max(f32::MIN_POSITIVE);
-        refs.par_iter_mut().for_each(|r| *r = r.scaled(factor));
+        out
+    }
+
+    fn union(mut self, other: Self) -> Self {
+        for lane in 0..8 {
+            self.most[lane] = greater(self.most[lane], other.most[lane]);
+        }
+        Self { most: self.most, centers: self.centers.union(other.centers) }
+    }
+
+    fn reach(&self) -> f32 {
+        let [x0, y0, z0, _, x1, y1, z1, _] = self.most;
+        x0.max(y0).max(z0).max(x1).max(y1).max(z1)
     }
 }
 

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 use super::{
     CHUNK,
-    bounds::{Bounds, PrimRef, greater, lesser, reduce},
+    bounds::{Bounds, PrimRef, greater, lesser},
 };
 use crate::simd::{Simd, SimdLevel, Task, dispatch};
 
@@ -34,29 +34,31 @@ const FEW: usize = 1024;
 /// The numbers of the triangles in their order along the curve.
 pub(super) struct Order {
     words: Vec<u64>,
-    number: u64,
+    number_bits: u32,
 }
 
 impl Order {
-    /// Of all triangles; those that are never hit come first.
-    pub(super) fn new(refs: &[PrimRef]) -> Self {
-        let grid = Grid::new(refs);
+    /// Of all triangles, given the box of the centres of those that may be hit; those that are never hit come first.
+    pub(super) fn new(refs: &[PrimRef], centers: &Bounds) -> Self {
+        let grid = Grid::new(refs, centers);
         let mut words = vec![0; refs.len()];
         words.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, words)| {
             dispatch(SimdLevel::best(), Words(&grid, refs, chunk * CHUNK, words));
         });
         sort(&mut words, grid.number_bits, 3 * grid.axis_bits);
-        Self { words, number: (1 << grid.number_bits) - 1 }
+        Self { words, number_bits: grid.number_bits }
     }
 
-    pub(super) fn len(&self) -> usize {
-        self.words.len()
+    /// The cell of the triangle at a place of the order, along the curve.
+    #[inline(always)]
+    pub(super) fn code(&self, place: usize) -> u64 {
+        self.words[place] >> self.number_bits
     }
 
     /// The triangle at a place of the order.
     #[inline(always)]
     pub(super) fn number(&self, place: usize) -> u32 {
-        (self.words[place] & self.number) as u32
+        (self.words[place] & ((1 << self.number_bits) - 1)) as u32
     }
 }
 
@@ -70,8 +72,7 @@ struct Grid {
 }
 
 impl Grid {
-    fn new(refs: &[PrimRef]) -> Self {
-        let centers = reduce(refs, Bounds::of_present_centers, Bounds::union);
+    fn new(refs: &[PrimRef], centers: &Bounds) -> Self {
         let number_bits = usize::BITS - refs.len().leading_zeros();
         let axis_bits = ((u64::BITS - number_bits) / 3).min(MAX_AXIS_BITS);
         let cells = ((1_u32 << axis_bits) - 1) as f32;
@@ -234,7 +235,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::geom::Triangles;
+    use crate::{accel::topology::bounds::normalize, geom::Triangles};
 
     proptest! {
         #[test]
@@ -271,9 +272,10 @@ mod tests {
         positions[40].y = f32::NAN;
         let indices: Vec<_> = (0..100).map(|i| [i; 3]).collect();
         let prims = Triangles { positions: &positions, indices: &indices, topology_epoch: 0 };
-        let refs: Vec<_> = (0..100).map(|id| PrimRef::new(&prims, id)).collect();
-        let order = Order::new(&refs);
-        let found: Vec<_> = (0..order.len()).map(|place| order.number(place)).collect();
+        let mut refs: Vec<_> = (0..100).map(|id| PrimRef::new(&prims, id)).collect();
+        let centers = normalize(&mut refs);
+        let order = Order::new(&refs, &centers);
+        let found: Vec<_> = (0..100).map(|place| order.number(place)).collect();
         let mut due = vec![40];
         due.extend((0..100).rev().filter(|&i| i != 40));
         assert_eq!(found, due);
