@@ -37,8 +37,10 @@ pub trait Simd: Copy + Send + Sync + 'static {
     /// The columns of eight records: number j of record i goes to lane i of row j.
     fn eight_columns(records: &[[f32; 8]; 8], to: &mut [[f32; 8]; 8]);
 
-    /// A quarter as many vertices as `F` has lanes, four lanes each, with any number in the fourth; `None` where one of them is the last of all or is none.
-    fn vertices(from: &[[f32; 3]], at: &[u32; 4]) -> Option<Self::F>;
+    /// The corners of `count` triangles, one to four, each named by the first three words of a record; the last stands in for those that four lack. A corner takes four lanes,
+    /// with any number in the fourth: vectors of eight lanes hold the first two triangles and the others, those of sixteen all of them, both times. `None` where
+    /// a corner is the last vertex of all or is none.
+    fn corners(from: &[[f32; 3]], records: &[[u32; 4]], count: usize) -> Option<[[Self::F; 3]; 2]>;
 
     /// `[1, 2, 0, 3]` in each four lanes.
     fn rotated(numbers: Self::F) -> Self::F;
@@ -154,6 +156,9 @@ pub trait Halves: Lanes<Elem = f32> {
     /// `[2, 3, 2, 3]`.
     #[must_use]
     fn high_half(self) -> Self;
+    /// `[1, 2, 0, 3]`.
+    #[must_use]
+    fn rotated(self) -> Self;
     /// Lane 0.
     fn first(self) -> f32;
     /// Lane 1.

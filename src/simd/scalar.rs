@@ -49,13 +49,16 @@ impl Simd for Scalar {
     }
 
     #[inline(always)]
-    fn vertices(from: &[[f32; 3]], at: &[u32; 4]) -> Option<Self::F> {
-        let mut out = [0.0; 8];
-        for (out, &vertex) in out.as_chunks_mut::<4>().0.iter_mut().zip(at) {
-            let [[x, y, z], [next, ..]] = *from.get(vertex as usize..)?.first_chunk()?;
-            *out = [x, y, z, next];
+    fn corners(from: &[[f32; 3]], records: &[[u32; 4]], count: usize) -> Option<[[Self::F; 3]; 2]> {
+        let mut out = [[Array([0.0; 8]); 3]; 2];
+        for i in 0..4 {
+            for corner in 0..3 {
+                let vertex = records[i.min(count - 1)][corner] as usize;
+                let [[x, y, z], [next, ..]] = *from.get(vertex..)?.first_chunk()?;
+                out[i / 2][corner].0[4 * (i % 2)..][..4].copy_from_slice(&[x, y, z, next]);
+            }
         }
-        Some(Array(out))
+        Some(out)
     }
 
     #[inline(always)]
@@ -313,6 +316,11 @@ impl Halves for Array<f32, 4> {
     fn high_half(self) -> Self {
         let [_, _, c, d] = self.0;
         Self([c, d, c, d])
+    }
+    #[inline(always)]
+    fn rotated(self) -> Self {
+        let [a, b, c, d] = self.0;
+        Self([b, c, a, d])
     }
     #[inline(always)]
     fn first(self) -> f32 {

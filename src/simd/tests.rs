@@ -130,18 +130,29 @@ impl Task for Operations<'_> {
         out.extend(bits32(&row));
         let vertices: &[[f32; 3]] = self.a.as_chunks().0;
         let finite: [f32; 16] = std::array::from_fn(|i| if self.a[i].is_nan() { 1.0 } else { self.a[i] + 0.0 });
-        for first in (0..4).step_by(S::F::LEN / 4) {
-            let at = [first, 3 - first, 2, 1];
-            let rotated = S::vertices(vertices, &at).map(S::rotated).expect("not the last");
-            let mut row = [0.0; 16];
-            rotated.store(&mut row);
-            for (four, at) in row[..S::F::LEN].as_chunks::<4>().0.iter().zip(at) {
-                let at = 3 * at as usize;
-                assert!(bits32(four).eq(bits32(&[self.a[at + 1], self.a[at + 2], self.a[at], self.a[at + 3]])));
+        let mut row = [0.0; 4];
+        four.rotated().store(&mut row);
+        out.extend(bits32(&row));
+        let records = [[0, 3, 1, 9], [2, 2, 0, 9], [3, 1, 1, 9], [1, 0, 3, 9], [0, 0, 0, 9]];
+        for count in 1..5 {
+            // The last records of all, or not.
+            let records = if self.a[0] < self.b[0] { &records[..] } else { &records[..count] };
+            let corners = S::corners(vertices, records, count).expect("none is the last");
+            for i in 0..4 {
+                let (part, first) = (4 * i / S::F::LEN, 4 * i % S::F::LEN);
+                for corner in 0..3 {
+                    let (mut row, mut rotated) = ([0.0; 16], [0.0; 16]);
+                    corners[part][corner].store(&mut row);
+                    S::rotated(corners[part][corner]).store(&mut rotated);
+                    let at = 3 * records[i.min(count - 1)][corner] as usize;
+                    assert!(bits32(&row[first..][..4]).eq(bits32(&self.a[at..][..4])));
+                    let [x, y, z] = vertices[at / 3];
+                    assert!(bits32(&rotated[first..][..3]).eq(bits32(&[y, z, x])));
+                }
             }
         }
-        for last in [4, 5, u32::MAX] {
-            assert!(S::vertices(vertices, &[0, last, 0, 0]).is_none());
+        for last in [4, 5, u32::MAX, u32::MAX / 3 + 1] {
+            assert!(S::corners(vertices, &[[0, 1, last, 0]], 1).is_none());
         }
         let (mut low, mut high) = ([0.0; 4], [0.0; 4]);
         S::least_four(S::F::load(&finite)).store(&mut low);

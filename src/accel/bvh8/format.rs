@@ -32,6 +32,8 @@ pub(in crate::accel) trait Format: Sized + Clone + Debug + Send + Sync + 'static
     const MOST: usize;
     const STORE: Self::Store;
 
+    /// How many items so many blocks and triangles take.
+    fn room(blocks: usize, triangles: usize) -> usize;
     /// Appends the items of a leaf with these triangles.
     fn push_leaf(own: &[u32], prims: &Triangles<'_>, items: &mut Vec<Self::Item>) -> Link;
     /// The items of a leaf that has some.

@@ -48,6 +48,10 @@ impl Format for Full {
     const MOST: usize = MAX_BLOCKS;
     const STORE: IntoNodes = IntoNodes;
 
+    fn room(blocks: usize, _triangles: usize) -> usize {
+        blocks
+    }
+
     fn push_leaf(own: &[u32], _prims: &Triangles<'_>, blocks: &mut Vec<TriBlock>) -> Link {
         let first = blocks.len();
         TriBlock::push(own, blocks);

@@ -84,7 +84,7 @@ impl<F: Format> Tree8<F> {
     /// Makes leaves and nodes over a wide topology.
     fn emit(&mut self, topology: &[[Child; WIDTH]], order: &[u32], prims: &Triangles<'_>) {
         self.nodes.reserve_exact(topology.len());
-        self.items.reserve(blocks(topology));
+        self.items.reserve_exact(F::room(blocks(topology), order.len()));
         for children in topology {
             let mut links = [Link::NONE; WIDTH];
             for slot in 0..WIDTH {

@@ -52,8 +52,13 @@ impl Simd for Avx2 {
     }
 
     #[inline(always)]
-    fn vertices(from: &[[f32; 3]], at: &[u32; 4]) -> Option<F32x8> {
-        two_vertices(from, at[0], at[1])
+    fn corners(from: &[[f32; 3]], records: &[[u32; 4]], count: usize) -> Option<[[F32x8; 3]; 2]> {
+        let (a, b) = (&records[0], &records[1.min(count - 1)]);
+        let (c, d) = (&records[2.min(count - 1)], &records[count - 1]);
+        let first = [two_vertices(from, a[0], b[0])?, two_vertices(from, a[1], b[1])?, two_vertices(from, a[2], b[2])?];
+        let second =
+            [two_vertices(from, c[0], d[0])?, two_vertices(from, c[1], d[1])?, two_vertices(from, c[2], d[2])?];
+        Some([first, second])
     }
 
     #[inline(always)]

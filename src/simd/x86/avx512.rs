@@ -4,8 +4,9 @@
 use std::arch::x86_64::*;
 
 use super::{
-    columns::{HIGHS, LOWS, ROTATED, eight_columns, near_pair, two_vertices, write_columns},
-    vectors::{F32x4, F32x8, F32x16, F64x4, F64x8, UPPER, halves, least_of, quarters, widen},
+    columns::{HIGHS, LOWS, ROTATED, eight_columns, near_pair, write_columns},
+    corners::corners,
+    vectors::{F32x4, F32x8, F32x16, F64x4, F64x8, halves, least_of, quarters, widen},
     words::{keys, load_words, of_bytes, sort, store_words},
 };
 use crate::simd::{Lanes, Simd, SimdLevel, Task, dispatch::call_avx512};
@@ -62,9 +63,9 @@ impl Simd for Avx512 {
     }
 
     #[inline(always)]
-    fn vertices(from: &[[f32; 3]], at: &[u32; 4]) -> Option<F32x16> {
-        let (low, high) = (two_vertices(from, at[0], at[1])?, two_vertices(from, at[2], at[3])?);
-        Some(F32x16(call!(_mm512_insertf32x8::<UPPER>(call!(_mm512_castps256_ps512(low.0)), high.0))))
+    fn corners(from: &[[f32; 3]], records: &[[u32; 4]], count: usize) -> Option<[[F32x16; 3]; 2]> {
+        let corners = corners(from, records, count)?;
+        Some([corners, corners])
     }
 
     #[inline(always)]

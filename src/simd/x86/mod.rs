@@ -13,6 +13,7 @@ macro_rules! call {
 mod avx2;
 mod avx512;
 mod columns;
+mod corners;
 mod vectors;
 mod words;
 

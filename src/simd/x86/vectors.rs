@@ -256,6 +256,11 @@ impl Halves for F32x4 {
         Self(call!(_mm_movehl_ps(self.0, self.0)))
     }
     #[inline(always)]
+    fn rotated(self) -> Self {
+        const ROTATED: i32 = 0b11_00_10_01;
+        Self(call!(_mm_shuffle_ps::<ROTATED>(self.0, self.0)))
+    }
+    #[inline(always)]
     fn first(self) -> f32 {
         call!(_mm_cvtss_f32(self.0))
     }

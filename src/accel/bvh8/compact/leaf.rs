@@ -8,7 +8,7 @@ use crate::{
 
 /// A triangle of a leaf.
 #[repr(C, align(16))]
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, bytemuck::Pod, bytemuck::Zeroable)]
 pub(in crate::accel) struct Corners {
     /// Numbers of its vertices.
     pub(super) vertices: [u32; 3],

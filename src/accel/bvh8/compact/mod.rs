@@ -33,6 +33,10 @@ impl Format for Compact {
     const MOST: usize = Link::MOST_IN_RUNS;
     const STORE: IntoSteps = IntoSteps;
 
+    fn room(_blocks: usize, triangles: usize) -> usize {
+        triangles
+    }
+
     fn push_leaf(own: &[u32], prims: &Triangles<'_>, items: &mut Vec<Corners>) -> Link {
         let first = items.len();
         items.extend(own.iter().map(|&prim| Corners::new(prim, prims)));

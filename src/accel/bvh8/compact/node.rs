@@ -78,16 +78,23 @@ fn exponent(low: f32, high: f32) -> u32 {
     if exponent > GREATEST { NO_STEP } else { exponent }
 }
 
+/// Bits of the boxes that are not empty.
+#[inline(always)]
+#[expect(clippy::cast_possible_truncation, reason = "a bit a child")]
+fn present<S: Simd>(rows: &Rows) -> u8 {
+    S::F8::load(&rows[0]).le(S::F8::load(&rows[4])) as u8
+}
+
 impl Steps {
     #[inline(always)]
     fn step(&self, axis: usize) -> f32 {
         power(u32::from(self.exponents[axis]))
     }
 
-    /// Sets the boxes of the children that are `present`; all others are empty. `around` is the box around them: lower corner, any number, upper corner, any number.
+    /// Sets the boxes of the children; `around` is the one around them all, which is not empty: lower corner, any number, upper corner, any number.
     #[inline(always)]
-    pub(super) fn set<S: Simd>(&mut self, rows: &Rows, around: &[f32; WIDTH], present: u8) {
-        self.present = present;
+    pub(super) fn set<S: Simd>(&mut self, rows: &Rows, around: &[f32; WIDTH]) {
+        self.present = present::<S>(rows);
         for axis in 0..3 {
             let (start, end) = (around[axis], around[axis + 4]);
             let bits = exponent(start, end);
@@ -116,9 +123,8 @@ impl Steps {
             self.clear();
             return;
         }
-        let (mut rows, mut present) = ([[0.0; WIDTH]; WIDTH], 0);
+        let mut rows = [[0.0; WIDTH]; WIDTH];
         for (child, &aabb) in aabbs.iter().enumerate() {
-            present |= u8::from(!aabb.is_empty()) << child;
             let aabb = if aabb.is_empty() { Aabb::EMPTY } else { aabb };
             for axis in 0..3 {
                 (rows[axis][child], rows[axis + 4][child]) = (aabb.min[axis], aabb.max[axis]);
@@ -126,7 +132,7 @@ impl Steps {
         }
         let ([a, b, c], [d, e, f]) = (all.min.to_array(), all.max.to_array());
         let around = [a, b, c, 0.0, d, e, f, 0.0];
-        self.set::<Scalar>(&rows, &around, present);
+        self.set::<Scalar>(&rows, &around);
     }
 
     /// No boxes.

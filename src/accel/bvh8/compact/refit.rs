@@ -9,6 +9,7 @@ use super::{
 use crate::{
     accel::{
         sah::{self, BLOCK},
+        topology::MAX_LEAF,
         wide::{
             Place, WIDTH, WideNode,
             refit::{Item, Items, Store, Subtree, Swept, TASK_NODES},
@@ -16,7 +17,7 @@ use crate::{
     },
     geom::{Aabb, Triangles},
     glam::Vec3,
-    simd::{Lanes, Simd, SimdLevel, Stack, Task, dispatch},
+    simd::{Halves, Lanes, Simd, SimdLevel, Stack, Task, dispatch, prefetch},
 };
 
 /// Boxes go into the nodes in steps.
@@ -35,7 +36,7 @@ impl Store<Steps> for IntoSteps {
 
 impl Item<Steps> for Corners {
     fn leaf(items: &mut [Self], own: Range<usize>, prims: &Triangles<'_>) -> Swept {
-        let (weight, mut areas) = (weight(own.len()), [0.0; 16]);
+        let (weight, mut areas) = (WEIGHTS[own.len() - 1], [0.0; 16]);
         let aabb = carefully(&items[own], prims, &mut areas);
         Swept { aabb, cost: sah::half_area(aabb) * weight, own_area: sum_of(&areas) }
     }
@@ -49,12 +50,6 @@ impl Item<Steps> for Corners {
     }
 }
 
-/// Cost of visiting a leaf, per unit of area.
-#[inline(always)]
-fn weight(triangles: usize) -> f64 {
-    sah::COST_BLOCK * triangles.div_ceil(BLOCK) as f64
-}
-
 /// The sum of half areas by their parts: three numbers of each four.
 #[inline(always)]
 fn sum_of(parts: &[f32; 16]) -> f64 {
@@ -66,7 +61,7 @@ fn sum_of(parts: &[f32; 16]) -> f64 {
 }
 
 /// The box around those triangles of a leaf whose corners are all finite. Parts of the half areas of their own boxes are added to `areas`, as
-/// [`Leaves::take`] does it.
+/// [`Gathered::leaf`] does it.
 fn carefully(own: &[Corners], prims: &Triangles<'_>, areas: &mut [f32; 16]) -> Aabb {
     let mut around = Aabb::EMPTY;
     for (i, corners) in own.iter().enumerate() {
@@ -98,48 +93,76 @@ static OWN: [[f32; 16]; BLOCK] = {
     rows
 };
 
-/// Sums over the triangles of a node's leaves, each triangle of a block in lanes of its own: on machines with eight lanes two in the first, two in the second.
-struct Leaves<S: Simd> {
-    /// Parts of the half areas of their own boxes.
+/// By how many triangles vertices are asked for before they are needed, those of one in four.
+const AHEAD: usize = 24;
+
+/// What is gathered from the children of nodes. Triangles of a block have lanes of their own: on machines with eight lanes two have the first vector, two the second.
+struct Gathered<S: Simd> {
+    /// Parts of the half areas of the triangles' own boxes.
     areas: [S::F; 2],
-    /// Coordinates: finite when all of them are, overflows aside.
+    /// Sums of the coordinates of a node's leaves: finite when all of these are, overflows aside.
     places: S::F,
+    /// The ends of the box around a node's leaves.
+    low: S::F,
+    high: S::F,
+    /// Parts of the half areas of nodes and leaves, times the cost of a visit.
+    costs: S::D4,
 }
 
-impl<S: Simd> Leaves<S> {
+impl<S: Simd> Gathered<S> {
+    /// Begins another node.
     #[inline(always)]
-    fn new() -> Self {
-        Self { areas: [S::F::splat(0.0); 2], places: S::F::splat(0.0) }
+    fn begin(&mut self) {
+        self.places = S::F::splat(0.0);
+        (self.low, self.high) = (S::F::splat(f32::INFINITY), S::F::splat(f32::NEG_INFINITY));
     }
 
-    /// Writes the ends of the box around the triangles of a leaf; false where it has the last vertex of all, which [`Simd::vertices`] does not load.
+    /// Writes the ends of the box around the triangles of a leaf; false where one has the last vertex of all, which [`Simd::corners`] does not load.
     #[inline(always)]
-    fn take(&mut self, items: &[Corners], own: Range<usize>, positions: &[[f32; 3]], ends: &mut [f32; WIDTH]) -> bool {
+    fn leaf(
+        &mut self,
+        records: &[[u32; 4]],
+        own: Range<usize>,
+        from: &[[f32; 3]],
+        weight: f64,
+        ends: &mut [f32; WIDTH],
+    ) -> bool {
         let (mut low, mut high) = (S::F::splat(f32::INFINITY), S::F::splat(f32::NEG_INFINITY));
         let (mut first, end) = (own.start, own.end);
         while first < end {
-            let last = (end - first).min(BLOCK) - 1;
-            // The last triangle of a block stands in for those that it lacks.
-            for group in (0..BLOCK).step_by(S::F::LEN / 4) {
-                let (mut a, mut b, mut c) = ([0; BLOCK], [0; BLOCK], [0; BLOCK]);
-                for i in 0..S::F::LEN / 4 {
-                    [a[i], b[i], c[i]] = items[first + (group + i).min(last)].vertices;
-                }
-                let Some(a) = S::vertices(positions, &a) else { return false };
-                let Some(b) = S::vertices(positions, &b) else { return false };
-                let Some(c) = S::vertices(positions, &c) else { return false };
+            let count = (end - first).min(BLOCK);
+            if let Some(&[a, b, c, _]) = records.get(first.wrapping_sub(AHEAD)) {
+                prefetch(from, a as usize);
+                prefetch(from, b as usize);
+                prefetch(from, c as usize);
+            }
+            let Some(corners) = S::corners(from, &records[first..], count) else { return false };
+            for part in 0..16 / S::F::LEN {
+                let [a, b, c] = corners[part];
                 self.places = self.places + (a + b + c);
                 let (least, most) = (a.min(b).min(c), a.max(b).max(c));
                 let extent = most - least;
-                let areas = &mut self.areas[group * 4 / S::F::LEN];
-                *areas = *areas + extent * S::rotated(extent) * S::F::load(&OWN[last & 3][4 * group..]);
+                let own = S::F::load(&OWN[(count - 1) & 3][part * S::F::LEN..]);
+                self.areas[part] = self.areas[part] + extent * S::rotated(extent) * own;
                 (low, high) = (least.min(low), most.max(high));
             }
             first += BLOCK;
         }
-        S::least_four(low).store(ends);
-        S::greatest_four(high).store(&mut ends[4..]);
+        (self.low, self.high) = (low.min(self.low), high.max(self.high));
+        let (low, high) = (S::least_four(low), S::greatest_four(high));
+        low.store(ends);
+        high.store(&mut ends[4..]);
+        self.visit(low, high, weight);
         true
+    }
+
+    /// Adds what a visit of a child costs.
+    #[inline(always)]
+    fn visit(&mut self, low: S::F4, high: S::F4, weight: f64) {
+        // Neither negative, as those of empty boxes, nor infinite.
+        let extent = (high - low).max(S::F4::splat(0.0)).min(S::F4::splat(f32::MAX));
+        let parts = S::widen(extent) * S::widen(extent.rotated());
+        self.costs = self.costs + parts * S::D4::splat(weight);
     }
 
     /// True when no vertex was NaN or infinite.
@@ -148,23 +171,15 @@ impl<S: Simd> Leaves<S> {
         let zero = S::F::splat(0.0);
         (self.places * zero).le(zero) == S::F::ALL
     }
-
-    #[inline(always)]
-    fn own_area(&self) -> f64 {
-        let mut parts = [0.0; 16];
-        self.areas[1].store(&mut parts[16 - S::F::LEN..]);
-        self.areas[0].store(&mut parts);
-        sum_of(&parts)
-    }
 }
 
-/// What is known of a subtree that was swept.
-#[derive(Clone, Copy)]
-struct Below {
-    /// Lower and upper corner, each with a fourth number.
-    ends: [f32; WIDTH],
-    cost: f64,
-    own_area: f64,
+/// All lanes of two vectors of eight numbers, or of one of sixteen.
+#[inline(always)]
+fn lanes<S: Simd>([first, second]: [S::F; 2]) -> [f32; 16] {
+    let mut out = [0.0; 16];
+    second.store(&mut out[16 - S::F::LEN..]);
+    first.store(&mut out);
+    out
 }
 
 /// The ends of an empty box.
@@ -178,18 +193,21 @@ fn is_empty(ends: &[f32; WIDTH]) -> bool {
     ends[0] > ends[4]
 }
 
-/// The children of a node.
+/// Costs of visiting leaves, per unit of area, by how many triangles they have less one.
+static WEIGHTS: [f64; MAX_LEAF] = {
+    let mut weights = [0.0; MAX_LEAF];
+    let mut i = 0;
+    while i < MAX_LEAF {
+        weights[i] = sah::COST_BLOCK * (i / BLOCK + 1) as f64;
+        i += 1;
+    }
+    weights
+};
+
+/// The ends of the children's boxes of a node, each with a fourth number, and the same by column.
 struct Kids {
-    /// Lower and upper corners, each with a fourth number.
     ends: Rows,
-    /// The same by column.
     rows: Rows,
-    /// What a visit costs, per unit of area.
-    weights: [f64; WIDTH],
-    /// Costs of what is below.
-    costs: [f64; WIDTH],
-    /// Bits of those that have a box.
-    present: u8,
 }
 
 /// A subtree, with the number of the first item of its leaves.
@@ -206,103 +224,104 @@ impl Task for Sweep<'_> {
     #[inline(always)]
     fn run<S: Simd>(self) -> Swept {
         let Self { nodes, items, first_item, prims } = self;
-        let positions: &[[f32; 3]] = bytemuck::cast_slice(prims.positions);
-        let mut waiting = Stack::<Below, TASK_NODES>::new();
-        let mut kids = Kids {
-            ends: [EMPTY; WIDTH],
-            rows: [[0.0; WIDTH]; WIDTH],
-            weights: [0.0; WIDTH],
-            costs: [0.0; WIDTH],
-            present: 0,
-        };
+        let (records, from) = (bytemuck::cast_slice(items), bytemuck::cast_slice(prims.positions));
+        let (zero, costs) = (S::F::splat(0.0), S::D4::splat(0.0));
+        let mut gathered = Gathered::<S> { areas: [zero; 2], places: zero, low: zero, high: zero, costs };
+        let mut waiting = Stack::<[f32; WIDTH], TASK_NODES>::new();
+        let mut kids = Kids { ends: [EMPTY; WIDTH], rows: [[0.0; WIDTH]; WIDTH] };
         for node in nodes.iter_mut().rev() {
-            let (mut leaves, mut are_whole) = (Leaves::<S>::new(), true);
-            let mut own_area = 0.0;
-            (kids.ends, kids.weights, kids.costs) = ([EMPTY; WIDTH], [0.0; WIDTH], [0.0; WIDTH]);
-            kids.present = 0;
+            let (areas, costs, mut are_whole) = (gathered.areas, gathered.costs, true);
+            let (mut low, mut high) = (S::F4::load(&EMPTY), S::F4::load(&EMPTY[4..]));
+            gathered.begin();
+            kids.ends = [EMPTY; WIDTH];
             for slot in 0..WIDTH {
                 let link = node.word(slot);
+                if !link.is_leaf() {
+                    let Some(below) = waiting.pop() else { continue };
+                    kids.ends[slot] = below;
+                    let ends = (S::F4::load(&below), S::F4::load(&below[4..]));
+                    (low, high) = (ends.0.min(low), ends.1.max(high));
+                    gathered.visit(ends.0, ends.1, sah::COST_TRAVERSE);
+                    continue;
+                }
                 if link.is_none() {
                     break;
                 }
-                if link.is_leaf() {
-                    let own = link.triangles();
-                    kids.weights[slot] = weight(own.len());
-                    let own = own.start - first_item..own.end - first_item;
-                    are_whole &= leaves.take(items, own, positions, &mut kids.ends[slot]);
-                    kids.present |= 1 << slot;
-                } else if let Some(below) = waiting.pop() {
-                    kids.ends[slot] = below.ends;
-                    kids.weights[slot] = sah::COST_TRAVERSE;
-                    kids.costs[slot] = below.cost;
-                    own_area += below.own_area;
-                    kids.present |= u8::from(!is_empty(&below.ends)) << slot;
-                }
+                let own = link.triangles();
+                let weight = WEIGHTS[(own.len() - 1) % MAX_LEAF];
+                let own = own.start - first_item..own.end - first_item;
+                are_whole &= gathered.leaf(records, own, from, weight, &mut kids.ends[slot]);
             }
-            own_area += if are_whole && leaves.are_finite() {
-                leaves.own_area()
+            let mut around = EMPTY;
+            if are_whole && gathered.are_finite() {
+                S::least_four(gathered.low).min(low).store(&mut around);
+                S::greatest_four(gathered.high).max(high).store(&mut around[4..]);
             } else {
-                again(node, &mut kids, (items, first_item), prims)
-            };
-            waiting.push(taken::<S>(node, &mut kids, own_area));
+                let mut sums = Sums { areas: lanes::<S>(areas), costs: [0.0; 4] };
+                costs.store(&mut sums.costs);
+                around = again(node, &mut kids, (items, first_item), prims, &mut sums);
+                gathered.areas = [S::F::load(&sums.areas), S::F::load(&sums.areas[16 - S::F::LEN..])];
+                gathered.costs = S::D4::load(&sums.costs);
+            }
+            if is_empty(&around) {
+                node.clear();
+                around = EMPTY;
+            } else {
+                S::eight_columns(&kids.ends, &mut kids.rows);
+                node.set::<S>(&kids.rows, &around);
+            }
+            waiting.push(around);
         }
-        let Some(Below { ends: [a, b, c, _, d, e, f, _], cost, own_area }) = waiting.pop() else { return Swept::EMPTY };
-        Swept { aabb: Aabb { min: Vec3::new(a, b, c), max: Vec3::new(d, e, f) }, cost, own_area }
+        let Some([a, b, c, _, d, e, f, _]) = waiting.pop() else { return Swept::EMPTY };
+        let mut costs = [0.0; 4];
+        gathered.costs.store(&mut costs);
+        let own_area = sum_of(&lanes::<S>(gathered.areas));
+        let aabb = Aabb { min: Vec3::new(a, b, c), max: Vec3::new(d, e, f) };
+        Swept { aabb, cost: costs[0] + costs[1] + costs[2], own_area }
     }
 }
 
-/// Takes the leaves of a node once more, without the triangles that are not there: the sum of half areas of the others' own boxes.
+/// Sums by lane.
+struct Sums {
+    areas: [f32; 16],
+    costs: [f64; 4],
+}
+
+/// Takes the children of a node once more, without the triangles that are not there: the ends of the box around them.
 #[cold]
 #[inline(never)]
-fn again(node: &Steps, kids: &mut Kids, (items, first_item): (&[Corners], usize), prims: &Triangles<'_>) -> f64 {
-    let mut areas = [0.0; 16];
+fn again(
+    node: &Steps,
+    kids: &mut Kids,
+    (items, first_item): (&[Corners], usize),
+    prims: &Triangles<'_>,
+    sums: &mut Sums,
+) -> [f32; WIDTH] {
+    let mut around = EMPTY;
     for slot in 0..WIDTH {
         let link = node.word(slot);
-        if link.is_leaf() && !link.is_none() {
+        if link.is_none() {
+            break;
+        }
+        let mut weight = sah::COST_TRAVERSE;
+        if link.is_leaf() {
             let own = link.triangles();
-            let around = carefully(&items[own.start - first_item..own.end - first_item], prims, &mut areas);
-            let ([a, b, c], [d, e, f]) = (around.min.to_array(), around.max.to_array());
-            kids.ends[slot] = [a, b, c, 0.0, d, e, f, 0.0];
-            kids.present &= !(u8::from(around.is_empty()) << slot);
+            weight = WEIGHTS[(own.len() - 1) % MAX_LEAF];
+            let own = own.start - first_item..own.end - first_item;
+            let aabb = carefully(&items[own], prims, &mut sums.areas);
+            let ([a, b, c], [d, e, f]) = (aabb.min.to_array(), aabb.max.to_array());
+            kids.ends[slot] = [a, b, c, a, d, e, f, d];
+        }
+        let ends = &kids.ends[slot];
+        let mut extent = [0.0; 3];
+        for axis in 0..3 {
+            around[axis] = around[axis].min(ends[axis]);
+            around[axis + 4] = around[axis + 4].max(ends[axis + 4]);
+            extent[axis] = f64::from((ends[axis + 4] - ends[axis]).clamp(0.0, f32::MAX));
+        }
+        for axis in 0..3 {
+            sums.costs[axis] += extent[axis] * extent[(axis + 1) % 3] * weight;
         }
     }
-    sum_of(&areas)
-}
-
-/// Writes the boxes of the children, and sums up.
-#[inline(always)]
-fn taken<S: Simd>(node: &mut Steps, kids: &mut Kids, own_area: f64) -> Below {
-    let ends = &kids.ends;
-    let (mut low, mut high) = (S::F4::load(&ends[0]), S::F4::load(&ends[0][4..]));
-    for ends in &ends[1..] {
-        (low, high) = (low.min(S::F4::load(ends)), high.max(S::F4::load(&ends[4..])));
-    }
-    let mut out = Below { ends: EMPTY, cost: 0.0, own_area };
-    low.store(&mut out.ends);
-    high.store(&mut out.ends[4..]);
-    if kids.present == 0 {
-        node.clear();
-        out.ends = EMPTY;
-        return out;
-    }
-    S::eight_columns(&kids.ends, &mut kids.rows);
-    node.set::<S>(&kids.rows, &out.ends, kids.present);
-    let mut costs = [0.0; WIDTH];
-    for first in (0..WIDTH).step_by(S::D::LEN) {
-        let (weights, below) = (S::D::load(&kids.weights[first..]), S::D::load(&kids.costs[first..]));
-        (below + half_areas::<S>(&kids.rows, first) * weights).store(&mut costs[first..]);
-    }
-    let [a, b, c, d, e, f, g, h] = costs;
-    out.cost = ((a + b) + (c + d)) + ((e + f) + (g + h));
-    out
-}
-
-/// Half the surface areas of children from number `first` on, as [`sah::half_area`].
-#[inline(always)]
-fn half_areas<S: Simd>(rows: &Rows, first: usize) -> S::D {
-    let zero = S::D::splat(0.0);
-    let x = (S::load_wide(&rows[4][first..]) - S::load_wide(&rows[0][first..])).max(zero);
-    let y = (S::load_wide(&rows[5][first..]) - S::load_wide(&rows[1][first..])).max(zero);
-    let z = (S::load_wide(&rows[6][first..]) - S::load_wide(&rows[2][first..])).max(zero);
-    x * y + y * z + z * x
+    around
 }
