@@ -90,8 +90,8 @@ impl<const N: usize> Task for Fill<'_, N> {
         let mut out = Bins { bounds: [[Bounds::EMPTY; N]; 3], counts: [[0; N]; 3] };
         for prim in self.refs {
             let places = self.binning.bins_of(prim.center());
-            for axis in 0..3 {
-                let bin = (places[axis] as usize).min(N - 1);
+            for (axis, &place) in places[..3].iter().enumerate() {
+                let bin = (place as usize).min(N - 1);
                 out.bounds[axis][bin] = out.bounds[axis][bin].union(prim.bounds());
                 out.counts[axis][bin] += 1;
             }

@@ -147,21 +147,15 @@ impl Bounds {
     /// Twice the midpoint, and a number of no meaning.
     #[inline(always)]
     pub(super) fn center(&self) -> [f32; 4] {
-        let mut out = [0.0; 4];
-        for lane in 0..4 {
-            out[lane] = self.0[lane] - self.0[lane + 4];
-        }
-        out
+        let [x0, y0, z0, w0, x1, y1, z1, w1] = self.0;
+        [x0 - x1, y0 - y1, z0 - z1, w0 - w1]
     }
 
     /// What the box measures along each axis, times -1; below 0 or 0, also for an empty box.
     #[inline(always)]
     fn extents(&self) -> [f32; 4] {
-        let mut out = [0.0; 4];
-        for lane in 0..4 {
-            out[lane] = lesser(self.0[lane] + self.0[lane + 4], 0.0);
-        }
-        out
+        let [x0, y0, z0, w0, x1, y1, z1, w1] = self.0;
+        [lesser(x0 + x1, 0.0), lesser(y0 + y1, 0.0), lesser(z0 + z1, 0.0), lesser(w0 + w1, 0.0)]
     }
 
     /// What the box measures along an axis; 0 for an empty box.
@@ -226,11 +220,11 @@ impl Extent {
         out
     }
 
-    fn union(mut self, other: Self) -> Self {
-        for lane in 0..8 {
-            self.most[lane] = greater(self.most[lane], other.most[lane]);
+    fn union(self, Self { mut most, centers }: Self) -> Self {
+        for (most, own) in most.iter_mut().zip(self.most) {
+            *most = greater(*most, own);
         }
-        Self { most: self.most, centers: self.centers.union(other.centers) }
+        Self { most, centers: self.centers.union(centers) }
     }
 
     fn reach(&self) -> f32 {

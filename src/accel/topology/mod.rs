@@ -300,6 +300,7 @@ impl Settings {
 
     /// Cost of testing a leaf, per unit of area: blocks count, which hold one triangle where leaves do.
     #[inline(always)]
+    #[expect(clippy::cast_possible_truncation, reason = "small numbers")]
     fn leaf_cost(&self, count: u32) -> f32 {
         let blocks = match self.leaf {
             1 => count,

@@ -112,18 +112,18 @@ impl<'a> Sorted<'a> {
         let mut keys = [[u32::MAX; SMALL]; 3];
         for i in 0..refs.len() {
             let center = refs[i].center();
-            for axis in 0..3 {
+            for (axis, keys) in keys.iter_mut().enumerate() {
                 // Numbers that are not negative order as their bits do.
-                keys[axis][i] = (center[axis] - low[axis]).to_bits() & !PLACE | i as u32;
+                keys[i] = (center[axis] - low[axis]).to_bits() & !PLACE | i as u32;
             }
         }
-        for axis in 0..3 {
+        for (order, keys) in out.orders.iter_mut().zip(&keys) {
             for i in 0..refs.len() {
                 let mut before = 0;
-                for j in 0..SMALL {
-                    before += u32::from(keys[axis][j] < keys[axis][i]);
+                for key in keys {
+                    before += u32::from(*key < keys[i]);
                 }
-                out.orders[axis][(before & PLACE) as usize] = i as u8;
+                order[(before & PLACE) as usize] = i as u8;
             }
         }
         out
@@ -221,9 +221,7 @@ impl<'a> Sorted<'a> {
                 kept += is_member;
                 moved += 1 - is_member;
             }
-            for i in 0..moved {
-                self.orders[axis][kept + i] = rest[i];
-            }
+            self.orders[axis][kept..kept + moved].copy_from_slice(&rest[..moved]);
         }
     }
 }

@@ -1,3 +1,5 @@
+#![expect(clippy::cast_possible_truncation, reason = "small numbers")]
+
 use glam::Vec3;
 use proptest::prelude::*;
 
