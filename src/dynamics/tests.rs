@@ -102,15 +102,21 @@ impl Task for Together<'_> {
 fn packets_answer_as_single_rays_do() {
     let ray = |i: u16| {
         let (x, y) = (f32::from(i % 25) / 12.0 - 1.0, f32::from(i / 25) / 12.0 - 1.0);
-        let dir = if i.is_multiple_of(11) { Vec3::NAN } else { Vec3::new(x * 0.5, y * 0.5, -1.0) };
-        Ray::new(Vec3::new(0.0, 0.3, 6.0), dir)
+        // One in eleven is no ray; runs of others are too long, short or far away for f32.
+        let odd = [(1e9, 6.0), (1e-9, 6.0), (1.0, 5e3), (1e30, 6.0), (9e8, 5.5)];
+        let (size, z) = odd.get(usize::from(i / 40 % 7)).map_or((1.0, 6.0), |&odd| odd);
+        let size = if i.is_multiple_of(11) { f32::NAN } else { size };
+        Ray::new(Vec3::new(0.0, 0.3, z), Vec3::new(x * 0.2, y * 0.2, -1.0) * size)
     };
     let rays: Vec<Ray> = (0..625).map(ray).collect();
     let cases = [
         ("list", Grouping::ByMotion, bodies(12)),
         ("bvh2", Grouping::ByMotion, bodies(12)),
         ("bvh2", Grouping::Single, bodies(12)),
+        // Rigid parts by lane: few, and many with a level over them.
+        ("bvh8", Grouping::ByMotion, bodies(3)),
         ("bvh8", Grouping::ByMotion, bodies(12)),
+        ("bvh8", Grouping::ByMotion, bodies(70)),
         // Nothing rigid: packets go by lane through several groups.
         ("bvh8", Grouping::ByMotion, figure(20)),
         ("bvh8", Grouping::Single, figure(20)),
@@ -120,8 +126,11 @@ fn packets_answer_as_single_rays_do() {
         for (i, scene) in (0_u8..).zip([figure(30), second, still()]) {
             frames.add(Arc::new(scene), DAffine3::from_translation(DVec3::new(f64::from(i) - 1.0, 0.0, 0.0)));
         }
+        // So small that the longest rays are too long for f32 in its space.
+        let small = DAffine3::from_translation(DVec3::new(0.0, 0.3, 5.997));
+        frames.add(Arc::new(bodies(3)), small * DAffine3::from_scale(DVec3::splat(1.0 / 2048.0)));
         let clip = at(0.7);
-        let world = frames.advance(&[&clip, &clip, &[]]).unwrap().0;
+        let world = frames.advance(&[&clip, &clip, &[], &clip]).unwrap().0;
         for level in SimdLevel::available() {
             let (singly, together, blocked_singly, blocked) = dispatch(level, Together(&world, &rays));
             assert!(singly.iter().flatten().count() > 20, "rays must hit something");

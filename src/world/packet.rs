@@ -67,7 +67,7 @@ impl World {
     pub fn nearest_hits<S: Simd>(&self, rays: &[Ray], hits: &mut [Option<Hit>]) {
         assert!(rays.len() <= PACKET && rays.len() <= hits.len(), "at most {PACKET} rays, a hit for each");
         hits[rays.len()..].fill(None);
-        if self.takes_lanes() && self.nearest_by_lane::<S>(rays, hits) {
+        if self.top.takes_lanes() && self.nearest_by_lane::<S>(rays, hits) {
             return;
         }
         hits.fill(None);
@@ -103,7 +103,7 @@ impl World {
     #[inline(always)]
     pub fn blocked<S: Simd>(&self, rays: &[Ray]) -> u32 {
         assert!(rays.len() <= PACKET, "at most {PACKET} rays");
-        if self.takes_lanes()
+        if self.top.takes_lanes()
             && let Some(blocked) = self.blocked_by_lane::<S>(rays)
         {
             return blocked;

@@ -64,14 +64,22 @@ pub(crate) struct Top {
     /// The greatest coordinate of the boxes.
     reach: f32,
     lists: FlatLists,
+    /// Packets go by lane through every group, and through the level over them.
+    takes_lanes: bool,
     /// The version of the boxes that it was made of; 0 for none.
     version: u64,
     inversions: Inversions,
 }
 
+fn takes_lanes(kind: TopKind, groups: &[GroupFrame]) -> bool {
+    (groups.len() <= FLAT || kind == TopKind::Bvh2)
+        && groups.iter().all(|group| group.rigid.is_some() || group.accel.takes_lanes())
+}
+
 impl Top {
     /// As [`Top::rebuild`] unless `version`, which names the boxes and is not 0, is that of the last time; true when it did.
     pub(crate) fn follow(&mut self, kind: TopKind, groups: &[GroupFrame], version: u64) -> bool {
+        self.takes_lanes = takes_lanes(kind, groups);
         if self.version == version && self.kind == kind {
             self.inversions = Inversions::default();
             return false;
@@ -94,6 +102,7 @@ impl Top {
     /// Prepares for `groups`, from what was prepared before where that serves. No allocation when there were as many groups before.
     pub(crate) fn rebuild(&mut self, kind: TopKind, groups: &[GroupFrame]) {
         (self.kind, self.version, self.inversions) = (kind, 0, Inversions::default());
+        self.takes_lanes = takes_lanes(kind, groups);
         self.reach = groups
             .iter()
             .filter(|group| !group.bounds.is_empty())
@@ -169,6 +178,12 @@ impl Top {
             met += 1;
         }
         order
+    }
+
+    /// True when packets go by lane through every group, and through the level over them.
+    #[inline(always)]
+    pub(super) fn takes_lanes(&self) -> bool {
+        self.takes_lanes
     }
 
     /// The greatest coordinate of the boxes.

@@ -3,7 +3,7 @@
 use super::{Nearest, PacketRays, Spread};
 use crate::{
     accel::{
-        AnyAccel, HitSink,
+        AnyAccel, EightPacket, HitSink,
         bvh8::{Full, Tree8},
         query::SLACK,
         run::{ClosestLanes, OccludedLanes},
@@ -36,6 +36,29 @@ impl LanePacket {
     #[inline(always)]
     pub(crate) fn points_apart<S: Simd>(&self, taken: u32) -> bool {
         self.rays.points_apart::<S>(taken)
+    }
+
+    /// The greatest coordinate of an origin.
+    #[inline(always)]
+    pub(in crate::accel) fn far<S: Simd>(&self) -> f64 {
+        let [x, y, z] = &self.rays.origin32;
+        let far = S::F::load(x).abs().max(S::F::load(y).abs()).max(S::F::load(z).abs());
+        f64::from(S::range(far, S::F::ALL)[1])
+    }
+
+    /// The rays against nodes of boxes within `reach` of 0.
+    #[inline(always)]
+    pub(crate) fn lines<S: Simd>(&self, reach: f32) -> EightPacket<S> {
+        let PacketRays { origin32: [x, y, z], dir32: [dx, dy, dz], t_near32, .. } = &self.rays;
+        let from = [S::F::load(x), S::F::load(y), S::F::load(z)];
+        let dir = [S::F::load(dx), S::F::load(dy), S::F::load(dz)];
+        EightPacket::new(from, dir, [0.0; 3], reach, S::F::load(t_near32))
+    }
+
+    /// Beyond these `t` nothing counts any more.
+    #[inline(always)]
+    pub(crate) fn limit<S: Simd>(&self) -> S::F {
+        S::F::load(&self.rays.t_cull)
     }
 
     /// The rays that may meet a box within the reach, at their best hits or before.

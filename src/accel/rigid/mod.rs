@@ -28,6 +28,7 @@
 //! tested as those of other structures are.
 
 mod exact;
+mod lanes;
 mod packet;
 mod single;
 

@@ -42,7 +42,7 @@ impl RigidPlace {
     /// The rays of a packet in the part's space, as [`RigidPlace::localize`].
     #[inline(always)]
     #[expect(clippy::cast_possible_truncation, reason = "the walk allows for the rounding, and for infinities")]
-    fn localize_packet<S: Simd>(&self, packet: &PacketRays, far: f64, reach: f32) -> EightPacket<S> {
+    pub(super) fn localize_packet<S: Simd>(&self, packet: &PacketRays, far: f64, reach: f32) -> EightPacket<S> {
         let (x, y, z) = (self.part_from_world.x_axis, self.part_from_world.y_axis, self.part_from_world.z_axis);
         let mut from = [[0.0_f32; PACKET]; 3];
         let mut dir = [[0.0_f32; PACKET]; 3];
@@ -78,7 +78,7 @@ impl RigidPlace {
 
 /// The triangles of a block where they are in the world.
 #[inline(always)]
-fn in_world(block: &TriBlock, prims: &Triangles<'_>) -> TriBlock {
+pub(super) fn in_world(block: &TriBlock, prims: &Triangles<'_>) -> TriBlock {
     let mut own = TriBlock::new([block.prim(0), block.prim(1), block.prim(2), block.prim(3)]);
     own.refit(prims);
     own

@@ -271,14 +271,14 @@ fn pair<F: Floats>(x: F, size: F, repeat: u32, nearest: u32) -> ([F; 2], F) {
     (pair, F::select(nearest, zero, centred - below))
 }
 
+/// Numbers of texels, from 0 to 2^23 - 1: the low bits of what 2^23 more has for a mantissa.
 #[cfg_attr(not(debug_assertions), inline(always))]
 fn whole<F: Floats>(x: F) -> [u32; LANES] {
-    let x = row(x);
+    const BEYOND: u32 = 1 << 23;
+    let x = row(x + F::splat(BEYOND as f32));
     let mut out = [0; LANES];
     for i in 0..F::LEN {
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a texel's number")]
-        let number = x[i] as i32 as u32;
-        out[i] = number;
+        out[i] = x[i].to_bits() & (BEYOND - 1);
     }
     out
 }
