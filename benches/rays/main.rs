@@ -48,7 +48,7 @@ enum Answers {
 }
 
 fn answers(peer: &dyn Peer, set: &Rays) -> Answers {
-    if set.any_hit { Answers::Blocked(peer.blocked(&set.rays)) } else { Answers::Closest(peer.closest(&set.rays)) }
+    if set.is_any { Answers::Blocked(peer.blocked(&set.all)) } else { Answers::Closest(peer.closest(&set.all)) }
 }
 
 /// Rays that are answered otherwise: other triangles at about the same distance count as equal.
@@ -101,13 +101,13 @@ fn rays(peers: &[Box<dyn Peer>], set: &Rays) {
         }
     }
     for (i, name) in peers::NAMES.iter().enumerate() {
-        let rate = set.rays.len() as f64 / best[i] * 1e-6;
+        let rate = set.all.len() as f64 / best[i] * 1e-6;
         println!("{:<9} {name:<22} {rate:8.2} M/s  {:5.2} x  {} differ", set.name, best[i] / best[0], wrong[i]);
     }
     // Ours are equal bit for bit; the others err at edges alone.
     for (name, &wrong) in peers::NAMES.iter().zip(&wrong) {
-        let most = if name.starts_with("kinora") { 0 } else { set.rays.len() / 50 };
-        assert!(wrong <= most, "{name} answers {wrong} of {} rays otherwise", set.rays.len());
+        let most = if name.starts_with("kinora") { 0 } else { set.all.len() / 50 };
+        assert!(wrong <= most, "{name} answers {wrong} of {} rays otherwise", set.all.len());
     }
 }
 

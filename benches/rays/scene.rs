@@ -17,8 +17,8 @@ pub(crate) struct Scene {
 pub(crate) struct Rays {
     pub(crate) name: &'static str,
     /// Whether anything is hit, not what.
-    pub(crate) any_hit: bool,
-    pub(crate) rays: Vec<Ray>,
+    pub(crate) is_any: bool,
+    pub(crate) all: Vec<Ray>,
 }
 
 /// Names of sets, of their files, and whether any hit will do.
@@ -39,7 +39,7 @@ impl Scene {
         let positions: Vec<_> = corners.as_chunks::<3>().0.iter().map(|&p| Vec3::from(p)).collect();
         let indices = (0..positions.len() as u32 / 3).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
         let mut read = Vec::new();
-        for (name, file, any_hit) in SETS {
+        for (name, file, is_any) in SETS {
             let path = folder.join("r0000").join(file).with_extension("rays");
             if !path.exists() {
                 println!("no rays in {}", path.display());
@@ -52,7 +52,7 @@ impl Scene {
                 dir: Vec3::new(dx, dy, dz),
                 t_far,
             };
-            read.push(Rays { name, any_hit, rays: records.as_chunks::<8>().0.iter().map(ray).collect() });
+            read.push(Rays { name, is_any, all: records.as_chunks::<8>().0.iter().map(ray).collect() });
         }
         Ok(Self { positions, indices, read })
     }
@@ -74,7 +74,7 @@ impl Scene {
             state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
             (state >> 40) as f32 / 8_388_608.0 - 1.0
         };
-        let mut sets = SETS.map(|(name, _, any_hit)| Rays { name, any_hit, rays: Vec::new() });
+        let mut sets = SETS.map(|(name, _, is_any)| Rays { name, is_any, all: Vec::new() });
         for ray in &primary {
             let Some((_, t)) = first_hit(first, *ray) else { continue };
             let point = ray.origin + ray.dir * (t * 0.9999);
@@ -84,11 +84,11 @@ impl Scene {
                     break dir;
                 }
             };
-            sets[1].rays.push(Ray { t_far: 0.5, ..Ray::new(point, away) });
-            sets[2].rays.push(Ray::new(point, away));
-            sets[3].rays.push(Ray { t_far: 1.0, ..Ray::new(point, Vec3::new(2.0, 3.0, 2.5) - point) });
+            sets[1].all.push(Ray { t_far: 0.5, ..Ray::new(point, away) });
+            sets[2].all.push(Ray::new(point, away));
+            sets[3].all.push(Ray { t_far: 1.0, ..Ray::new(point, Vec3::new(2.0, 3.0, 2.5) - point) });
         }
-        sets[0].rays = primary;
+        sets[0].all = primary;
         sets.into()
     }
 }

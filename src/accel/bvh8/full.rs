@@ -97,7 +97,7 @@ impl Format for Full {
             S::call(ClosestApart { tree, prims, rays, forms, together: false, out });
         } else {
             let apart = |rays: &[Ray], out: &mut [Option<Hit>]| {
-                S::call(ClosestApart { tree, prims, rays, forms, together: true, out })
+                S::call(ClosestApart { tree, prims, rays, forms, together: true, out });
             };
             coherent::closest::<S, _>(tree, prims, (rays, packet), forms, out, apart);
         }
@@ -115,7 +115,7 @@ impl Format for Full {
             S::call(OccludedApart { tree, prims, rays, forms, together: false, out });
         } else {
             let apart = |rays: &[Ray], out: &mut [bool]| {
-                S::call(OccludedApart { tree, prims, rays, forms, together: true, out })
+                S::call(OccludedApart { tree, prims, rays, forms, together: true, out });
             };
             coherent::occluded::<S, _>(tree, prims, (rays, packet), forms, out, apart);
         }

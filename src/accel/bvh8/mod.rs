@@ -165,7 +165,7 @@ impl Accel for Bvh8 {
             (Form::Full(tree), Form::Full(out)) => tree.refit_into(out, prims),
             (Form::Compact(tree), Form::Compact(out)) => tree.refit_into(out, prims),
             (form, other) => {
-                *other = form.clone();
+                other.clone_from(form);
                 self.refit_into(out, prims)
             }
         }
