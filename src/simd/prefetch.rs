@@ -15,7 +15,7 @@ pub fn prefetch<T>(slice: &[T], at: usize) {
     let _ = (slice, at);
 }
 
-/// As [`prefetch`], for the first [`LINES`] cache lines of an item of the one slice or the other, without a branch on which.
+/// As [`prefetch`], for the first three cache lines of an item of the one slice or the other, without a branch on which.
 #[inline(always)]
 pub fn prefetch_either<A, B>(first: bool, a: &[A], b: &[B], at: usize) {
     #[cfg(all(target_arch = "x86_64", not(miri)))]

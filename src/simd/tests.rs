@@ -56,6 +56,44 @@ fn each<V: Lanes>(a: &[V::Elem], b: &[V::Elem], zero: V::Elem) -> (Vec<V::Elem>,
     (rows, below, at_most)
 }
 
+impl Operations<'_> {
+    /// What takes triangles apart, against what it is said to give.
+    #[inline(always)]
+    fn check_triangles<S: Simd>(&self) {
+        let vertices: &[[f32; 3]] = self.a.as_chunks().0;
+        let finite: [f32; 16] = std::array::from_fn(|i| if self.a[i].is_nan() { 1.0 } else { self.a[i] + 0.0 });
+        let records = [[0, 3, 1, 9], [2, 2, 0, 9], [3, 1, 1, 9], [1, 0, 3, 9], [0, 0, 0, 9]];
+        for count in 1..5 {
+            // The last records of all, or not.
+            let records = if self.a[0] < self.b[0] { &records[..] } else { &records[..count] };
+            let corners = S::corners(vertices, records, count).expect("none is the last");
+            for i in 0..4 {
+                let (part, first) = (4 * i / S::F::LEN, 4 * i % S::F::LEN);
+                for corner in 0..3 {
+                    let (mut row, mut rotated) = ([0.0; 16], [0.0; 16]);
+                    corners[part][corner].store(&mut row);
+                    S::rotated(corners[part][corner]).store(&mut rotated);
+                    let at = 3 * records[i.min(count - 1)][corner] as usize;
+                    assert!(bits32(&row[first..][..4]).eq(bits32(&self.a[at..][..4])));
+                    let [x, y, z] = vertices[at / 3];
+                    assert!(bits32(&rotated[first..][..3]).eq(bits32(&[y, z, x])));
+                }
+            }
+        }
+        for last in [4, 5, u32::MAX, u32::MAX / 3 + 1] {
+            assert!(S::corners(vertices, &[[0, 1, last, 0]], 1).is_none());
+        }
+        let (mut low, mut high) = ([0.0; 4], [0.0; 4]);
+        S::least_four(S::F::load(&finite)).store(&mut low);
+        S::greatest_four(S::F::load(&finite)).store(&mut high);
+        for (lane, (low, high)) in low.into_iter().zip(high).enumerate() {
+            let column = finite[..S::F::LEN].iter().skip(lane).step_by(4);
+            assert!(column.clone().all(|&x| low <= x && x <= high));
+            assert!(column.clone().any(|&x| x <= low) && column.clone().any(|&x| x >= high));
+        }
+    }
+}
+
 impl Task for Operations<'_> {
     type Output = Vec<u64>;
 
@@ -128,40 +166,10 @@ impl Task for Operations<'_> {
         let mut row = [0.0; 8];
         S::of_bytes(&bytes).store(&mut row);
         out.extend(bits32(&row));
-        let vertices: &[[f32; 3]] = self.a.as_chunks().0;
-        let finite: [f32; 16] = std::array::from_fn(|i| if self.a[i].is_nan() { 1.0 } else { self.a[i] + 0.0 });
         let mut row = [0.0; 4];
         four.rotated().store(&mut row);
         out.extend(bits32(&row));
-        let records = [[0, 3, 1, 9], [2, 2, 0, 9], [3, 1, 1, 9], [1, 0, 3, 9], [0, 0, 0, 9]];
-        for count in 1..5 {
-            // The last records of all, or not.
-            let records = if self.a[0] < self.b[0] { &records[..] } else { &records[..count] };
-            let corners = S::corners(vertices, records, count).expect("none is the last");
-            for i in 0..4 {
-                let (part, first) = (4 * i / S::F::LEN, 4 * i % S::F::LEN);
-                for corner in 0..3 {
-                    let (mut row, mut rotated) = ([0.0; 16], [0.0; 16]);
-                    corners[part][corner].store(&mut row);
-                    S::rotated(corners[part][corner]).store(&mut rotated);
-                    let at = 3 * records[i.min(count - 1)][corner] as usize;
-                    assert!(bits32(&row[first..][..4]).eq(bits32(&self.a[at..][..4])));
-                    let [x, y, z] = vertices[at / 3];
-                    assert!(bits32(&rotated[first..][..3]).eq(bits32(&[y, z, x])));
-                }
-            }
-        }
-        for last in [4, 5, u32::MAX, u32::MAX / 3 + 1] {
-            assert!(S::corners(vertices, &[[0, 1, last, 0]], 1).is_none());
-        }
-        let (mut low, mut high) = ([0.0; 4], [0.0; 4]);
-        S::least_four(S::F::load(&finite)).store(&mut low);
-        S::greatest_four(S::F::load(&finite)).store(&mut high);
-        for (lane, (low, high)) in low.into_iter().zip(high).enumerate() {
-            let column = finite[..S::F::LEN].iter().skip(lane).step_by(4);
-            assert!(column.clone().all(|&x| low <= x && x <= high));
-            assert!(column.clone().any(|&x| x == low) && column.clone().any(|&x| x == high));
-        }
+        self.check_triangles::<S>();
         let mut ends = [f32::INFINITY, f32::NEG_INFINITY];
         for first in (0..16).step_by(S::F::LEN) {
             let numbers: Vec<f32> = self.b.iter().map(|b| if b.is_nan() { 0.0 } else { *b }).collect();

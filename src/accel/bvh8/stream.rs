@@ -291,6 +291,7 @@ impl Task for ClosestApart<'_> {
     #[inline(always)]
     fn run<S: Simd>(self) {
         let Self { tree, prims, rays, forms, together, out } = self;
+        #[expect(clippy::large_stack_arrays, reason = "24 KiB, mostly of places that few rays note")]
         let mut wings = [const { Wing::EMPTY }; WINGS];
         let mut flights = [const { Flight::IDLE }; IN_FLIGHT];
         let mut tri = Spread::EMPTY;
@@ -333,6 +334,7 @@ impl Task for OccludedApart<'_> {
     #[inline(always)]
     fn run<S: Simd>(self) {
         let Self { tree, prims, rays, forms, together, out } = self;
+        #[expect(clippy::large_stack_arrays, reason = "24 KiB, mostly of places that few rays note")]
         let mut wings = [const { Wing::EMPTY }; WINGS];
         let mut flights = [const { Flight::IDLE }; IN_FLIGHT];
         let mut tri = Spread::EMPTY;
