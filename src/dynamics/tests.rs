@@ -110,25 +110,25 @@ fn packets_answer_as_single_rays_do() {
     };
     let rays: Vec<Ray> = (0..625).map(ray).collect();
     let cases = [
-        ("list", Grouping::ByMotion, bodies(12)),
-        ("bvh2", Grouping::ByMotion, bodies(12)),
-        ("bvh2", Grouping::Single, bodies(12)),
+        ("list", Grouping::ByMotion, bodies(12), 60),
+        ("bvh2", Grouping::ByMotion, bodies(12), 60),
+        ("bvh2", Grouping::Single, bodies(12), 60),
         // Rigid parts by lane: few, and many with a level over them.
-        ("bvh8", Grouping::ByMotion, bodies(3)),
-        ("bvh8", Grouping::ByMotion, bodies(12)),
-        ("bvh8", Grouping::ByMotion, bodies(70)),
-        // Nothing rigid: packets go by lane through several groups.
-        ("bvh8", Grouping::ByMotion, figure(20)),
-        ("bvh8", Grouping::Single, figure(20)),
+        ("bvh8", Grouping::ByMotion, bodies(3), 2),
+        ("bvh8", Grouping::ByMotion, bodies(12), 60),
+        ("bvh8", Grouping::ByMotion, bodies(70), 60),
+        // Few rigid parts, many that deform.
+        ("bvh8", Grouping::ByMotion, figure(20), 60),
+        ("bvh8", Grouping::Single, figure(20), 60),
     ];
-    for (accel, grouping, second) in cases {
+    for (accel, grouping, second, small) in cases {
         let mut frames = FrameLoop::with_grouping(config(accel, RebuildPolicy::Refit), grouping).unwrap();
         for (i, scene) in (0_u8..).zip([figure(30), second, still()]) {
             frames.add(Arc::new(scene), DAffine3::from_translation(DVec3::new(f64::from(i) - 1.0, 0.0, 0.0)));
         }
         // So small that the longest rays are too long for f32 in its space.
-        let small = DAffine3::from_translation(DVec3::new(0.0, 0.3, 5.997));
-        frames.add(Arc::new(bodies(3)), small * DAffine3::from_scale(DVec3::splat(1.0 / 2048.0)));
+        let placed = DAffine3::from_translation(DVec3::new(0.0, 0.3, 5.997));
+        frames.add(Arc::new(bodies(small)), placed * DAffine3::from_scale(DVec3::splat(1.0 / 2048.0)));
         let clip = at(0.7);
         let world = frames.advance(&[&clip, &clip, &[], &clip]).unwrap().0;
         for level in SimdLevel::available() {

@@ -6,7 +6,7 @@
 //! # Source
 //! The hybrid traversal of Embree's packets: Benthin, Wald, Woop, Ernst and Mark, "Combining Single and Packet-Ray Tracing for Arbitrary Ray Distributions on the
 //! Intel MIC Architecture", 2012. Departures: single rays go on after the packet is done, several in flight; children that no ray's segment comes near are left
-//! out before.
+//! out.
 
 use super::{
     full::Full,
@@ -68,6 +68,16 @@ impl Rest {
             self.len[ray] = at + 1;
         } else {
             self.lost |= 1 << ray;
+        }
+    }
+
+    /// Notes a place for each of the rays in `mask`.
+    #[inline(always)]
+    fn note_each<S: Simd>(&mut self, mask: u32, due: &Due<S>) {
+        let mut entries = [0.0; PACKET];
+        due.near.store(&mut entries);
+        for i in bits(mask) {
+            self.note(i % PACKET, entries[i % PACKET], due.link);
         }
     }
 
@@ -261,10 +271,7 @@ pub(super) fn closest<S: Simd>(
     while let Some(due) = stack.pop() {
         let mask = due.mask & due.near.le(crown.limit);
         if mask.count_ones() <= FEW {
-            due.near.store(&mut kids.entries[0]);
-            for i in bits(mask) {
-                rest.note(i % PACKET, kids.entries[0][i % PACKET], due.link);
-            }
+            rest.note_each::<S>(mask, &due);
         } else if due.link.is_leaf() {
             for number in due.link.blocks() {
                 nearest.offer::<S, _>(rays, (&tree.items, number), mask, tri, &AnyHit);
@@ -294,10 +301,7 @@ pub(super) fn occluded<S: Simd>(
     while let Some(due) = stack.pop() {
         let mask = due.mask & open;
         if mask.count_ones() <= FEW {
-            due.near.store(&mut kids.entries[0]);
-            for i in bits(mask) {
-                rest.note(i % PACKET, kids.entries[0][i % PACKET], due.link);
-            }
+            rest.note_each::<S>(mask, &due);
         } else if due.link.is_leaf() {
             let mut left = mask;
             for number in due.link.blocks() {

@@ -8,7 +8,7 @@ use crate::{
         packet::LanePacket,
     },
     geom::Triangles,
-    simd::{Lanes, Simd, Task},
+    simd::{Simd, Task},
 };
 
 /// The rays in `open` on their way through a part.
@@ -33,7 +33,7 @@ impl<S: Simd, K: HitSink> ManyVisit<S> for Nearest<'_, K> {
 
     #[inline(always)]
     fn limit(&self) -> S::F {
-        S::F::load(&self.rays.packet.rays.t_cull)
+        self.rays.packet.limit::<S>()
     }
 
     #[inline(always)]
@@ -63,7 +63,7 @@ impl<S: Simd> ManyVisit<S> for Any<'_> {
 
     #[inline(always)]
     fn limit(&self) -> S::F {
-        S::F::load(&self.0.packet.rays.t_cull)
+        self.0.packet.limit::<S>()
     }
 
     #[inline(always)]
