@@ -87,6 +87,9 @@ pub trait Simd: Copy + Send + Sync + 'static {
     /// Writes the words whose bit is set, in order; any of the words or 0 may follow.
     fn compress(words: &[u32; 8], chosen: u32, to: &mut [u32; 8]);
 
+    /// Bits of the words that are at most `most`.
+    fn at_most(words: &[u32; 8], most: u32) -> u32;
+
     /// Orders the lanes whose bit is set by their numbers, which are finite and not negative, the greatest first: writes a key of each, and its word. The lowest three
     /// bits of a number do not count; equal ones go by lane. See [`key_floor`](super::key_floor). Anything may follow.
     fn descending(numbers: Self::F8, chosen: u32, words: &[u32; 8], keys: &mut [u32; 8], sorted: &mut [u32; 8]);

@@ -156,6 +156,15 @@ impl Simd for Scalar {
     }
 
     #[inline(always)]
+    fn at_most(words: &[u32; 8], most: u32) -> u32 {
+        let mut bits = 0;
+        for (i, &word) in words.iter().enumerate() {
+            bits |= u32::from(word <= most) << i;
+        }
+        bits
+    }
+
+    #[inline(always)]
     fn descending(numbers: Self::F8, chosen: u32, words: &[u32; 8], keys: &mut [u32; 8], sorted: &mut [u32; 8]) {
         let mut len = 0;
         for (lane, (&number, &word)) in (0..).zip(numbers.0.iter().zip(words)) {

@@ -28,8 +28,8 @@ use crate::{
 /// Numbers are spread over lanes where they are used: that is a load.
 pub(super) struct Boxes {
     line: Line,
-    /// 1 where the ray runs downward.
-    backward: [u8; 3],
+    /// Where the ray runs downward.
+    backward: [bool; 3],
     t_near: f32,
     /// The limit with slack.
     limit: f32,
@@ -39,7 +39,7 @@ impl Boxes {
     /// No ray.
     pub(super) const IDLE: Self = Self {
         line: Line { entry_mul: [0.0; 4], entry_add: [0.0; 4], exit_mul: [0.0; 4], exit_add: [0.0; 4] },
-        backward: [0; 3],
+        backward: [false; 3],
         t_near: 0.0,
         limit: 0.0,
     };
@@ -53,7 +53,7 @@ impl Boxes {
             self.line.entry_add[axis] = rows[1][i];
             self.line.exit_mul[axis] = rows[2][i];
             self.line.exit_add[axis] = rows[3][i];
-            self.backward[axis] = (rays.backward[axis] >> i & 1) as u8;
+            self.backward[axis] = rays.backward[axis] >> i & 1 == 1;
         }
         self.t_near = rays.t_near32[i];
         self.set_limit(rays.t_cull[i]);
@@ -64,7 +64,7 @@ impl Boxes {
         let dir = ray.range().dir;
         Self {
             line: Line::new::<S>(ray, reach),
-            backward: [u8::from(dir.x < 0.0), u8::from(dir.y < 0.0), u8::from(dir.z < 0.0)],
+            backward: [dir.x < 0.0, dir.y < 0.0, dir.z < 0.0],
             t_near: ray.range().t_near,
             limit: limit + SLACK,
         }
@@ -98,8 +98,9 @@ impl Boxes {
         let (mut entries, mut exits) = ([t_near; 3], [limit; 3]);
         let Line { entry_mul, entry_add, exit_mul, exit_add } = &self.line;
         for axis in 0..3 {
-            let side = usize::from(self.backward[axis] & 1);
-            let (first, last) = (node.planes::<S>(axis, side), node.planes::<S>(axis, side ^ 1));
+            let backward = self.backward[axis];
+            let (first, last) =
+                (node.planes::<S>(axis, usize::from(backward)), node.planes::<S>(axis, usize::from(!backward)));
             entries[axis] = first.mul_add_loose(S::F8::splat(entry_mul[axis]), S::F8::splat(entry_add[axis]));
             exits[axis] = last.mul_add_loose(S::F8::splat(exit_mul[axis]), S::F8::splat(exit_add[axis]));
         }

@@ -78,21 +78,26 @@ impl Flight {
 
     /// Puts a ray on its way.
     #[inline(always)]
-    fn begin<const IS_REST: bool>(&mut self, wings: &[Wing; WINGS], wing: usize, lane: usize) {
+    fn begin<S: Simd, const IS_REST: bool>(&mut self, wings: &[Wing; WINGS], wing: usize, lane: usize) {
         let from = &wings[wing % WINGS];
         self.boxes.take(&from.rays, lane % PACKET);
         (self.wing, self.lane) = (wing, lane);
         self.len = from.rest.unload(lane % PACKET, &mut self.keys, &mut self.links);
         if IS_REST {
-            self.prune();
+            self.prune::<S>();
         }
     }
 
     /// Puts the next ray that has somewhere to go on its way; false when there is none.
     #[inline(always)]
-    fn begin_next<const IS_REST: bool>(&mut self, waiting: &mut Waiting, wings: &[Wing; WINGS], used: usize) -> bool {
+    fn begin_next<S: Simd, const IS_REST: bool>(
+        &mut self,
+        waiting: &mut Waiting,
+        wings: &[Wing; WINGS],
+        used: usize,
+    ) -> bool {
         while let Some((wing, lane)) = waiting.next(wings, used) {
-            self.begin::<IS_REST>(wings, wing, lane);
+            self.begin::<S, IS_REST>(wings, wing, lane);
             if !IS_REST || self.len > 0 {
                 return true;
             }
@@ -109,7 +114,7 @@ impl Flight {
             S::call(ClosestLeaf { tree, link, wing, lane: self.lane % PACKET });
             let limit = wing.rays.t_cull[self.lane % PACKET];
             if self.boxes.set_limit(limit) {
-                self.prune();
+                self.prune::<S>();
             }
             return;
         }
@@ -132,13 +137,15 @@ impl Flight {
 
     /// Drops what the ray enters beyond its limit.
     #[inline(always)]
-    fn prune(&mut self) {
+    fn prune<S: Simd>(&mut self) {
         let (last, mut kept) = (self.boxes.last_key(), 0);
-        for i in 0..self.len.min(MAX_STACK) {
-            let (key, link) = (self.keys[i], self.links[i]);
-            self.keys[kept] = key;
-            self.links[kept] = link;
-            kept += usize::from(key <= last);
+        for at in (0..self.len.min(MAX_STACK)).step_by(WIDTH) {
+            let within = u32::MAX >> (32 - (self.len - at).min(WIDTH));
+            let (keys, links) = (*room(&mut self.keys, at), *room(&mut self.links, at));
+            let within = within & S::at_most(&keys, last);
+            S::compress(&keys, within, room(&mut self.keys, kept));
+            S::compress(&links, within, room(&mut self.links, kept));
+            kept += within.count_ones() as usize;
         }
         self.len = kept;
     }
@@ -236,16 +243,15 @@ fn fly<S: Simd, const ANY: bool, const ASK: bool>(
     flights: &mut [Flight; IN_FLIGHT],
 ) {
     let mut waiting = Waiting { wing: 0, left: wings[0].rest.left };
-    let mut slots = [0; IN_FLIGHT];
+    let mut order = flights.each_mut();
     let mut live = 0;
-    while live < IN_FLIGHT && flights[live].begin_next::<ASK>(&mut waiting, wings, used) {
-        slots[live] = live;
+    while live < IN_FLIGHT && order[live].begin_next::<S, ASK>(&mut waiting, wings, used) {
         live += 1;
     }
     while live > 0 {
         let mut at = 0;
         while at < live {
-            let flight = &mut flights[slots[at] % IN_FLIGHT];
+            let flight = &mut *order[at % IN_FLIGHT];
             let mut is_done = false;
             if ANY {
                 is_done = flight.occluded_step::<S, ASK>(tree, wings);
@@ -253,9 +259,9 @@ fn fly<S: Simd, const ANY: bool, const ASK: bool>(
             } else {
                 flight.closest_step::<S, ASK>(tree, wings);
             }
-            if (is_done || flight.len == 0) && !flight.begin_next::<ASK>(&mut waiting, wings, used) {
+            if (is_done || flight.len == 0) && !flight.begin_next::<S, ASK>(&mut waiting, wings, used) {
                 live -= 1;
-                slots.swap(at, live);
+                order.swap(at, live);
             } else {
                 at += 1;
             }

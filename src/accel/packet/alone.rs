@@ -31,7 +31,13 @@ impl PacketRays {
 /// A number of each axis of ray i in all lanes.
 #[inline(always)]
 fn splat3<S: Simd>([x, y, z]: &[[f32; PACKET]; 3], i: usize) -> [S::D4; 3] {
-    [S::D4::splat(f64::from(x[i])), S::D4::splat(f64::from(y[i])), S::D4::splat(f64::from(z[i]))]
+    [spread::<S>(x[i]), spread::<S>(y[i]), spread::<S>(z[i])]
+}
+
+/// A number in all lanes: one instruction where it is spread before it is widened.
+#[inline(always)]
+fn spread<S: Simd>(number: f32) -> S::D4 {
+    S::widen(S::F4::splat(number))
 }
 
 impl TriBlock {
@@ -45,10 +51,10 @@ impl TriBlock {
             return None;
         }
         let weights = Weights {
-            scale: S::D4::splat(BOUND * f64::from(packet.scale[i])),
-            t_near: S::D4::splat(f64::from(packet.t_near32[i])),
-            t_far: S::D4::splat(f64::from(packet.t_far[i])),
-            t_limit: S::D4::splat(f64::from(packet.t_cull[i])),
+            scale: spread::<S>(packet.scale[i]) * S::D4::splat(BOUND),
+            t_near: spread::<S>(packet.t_near32[i]),
+            t_far: spread::<S>(packet.t_far[i]),
+            t_limit: spread::<S>(packet.t_cull[i]),
         };
         let evaluated = Evaluated::new(&volumes, open, &weights);
         (evaluated.mask != 0).then_some(evaluated)

@@ -6,7 +6,7 @@ use std::arch::x86_64::*;
 use super::{
     columns::{ROTATED, eight_columns, four_columns, two_vertices},
     vectors::{F32x4, F32x8, F64x4, UPPER, least_of, quarters, widen},
-    words::{COMPRESS, keys, load_words, of_bytes, sort, store_words},
+    words::{COMPRESS, keys, load_words, of_bytes, sort, sort_four, store_words},
 };
 use crate::simd::{Lanes, Simd, SimdLevel, Task, dispatch::call_avx2};
 
@@ -151,11 +151,23 @@ impl Simd for Avx2 {
     }
 
     #[inline(always)]
+    fn at_most(words: &[u32; 8], most: u32) -> u32 {
+        let (words, most) = (load_words(words), call!(_mm256_set1_epi32(most.cast_signed())));
+        let within = call!(_mm256_cmpeq_epi32(call!(_mm256_max_epu32(words, most)), most));
+        call!(_mm256_movemask_ps(call!(_mm256_castsi256_ps(within)))).cast_unsigned()
+    }
+
+    #[inline(always)]
     fn descending(numbers: F32x8, chosen: u32, words: &[u32; 8], to_keys: &mut [u32; 8], to_words: &mut [u32; 8]) {
         let lanes = call!(_mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128));
         let bits = call!(_mm256_and_si256(call!(_mm256_set1_epi32(chosen.cast_signed())), lanes));
         let keys = call!(_mm256_and_si256(keys(numbers), call!(_mm256_cmpeq_epi32(bits, lanes))));
-        sort(keys, words, to_keys, to_words);
+        if chosen.count_ones() <= 4 {
+            let order = load_words(&COMPRESS[(chosen & 0xff) as usize]);
+            sort_four(call!(_mm256_permutevar8x32_epi32(keys, order)), words, to_keys, to_words);
+        } else {
+            sort(keys, words, to_keys, to_words);
+        }
     }
 
     #[inline(always)]

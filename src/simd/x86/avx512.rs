@@ -7,7 +7,7 @@ use super::{
     columns::{HIGHS, LOWS, ROTATED, eight_columns, near_pair, write_columns},
     corners::corners,
     vectors::{F32x4, F32x8, F32x16, F64x4, F64x8, halves, least_of, quarters, widen},
-    words::{keys, load_words, of_bytes, sort, store_words},
+    words::{keys, load_words, of_bytes, sort, sort_four, store_words},
 };
 use crate::simd::{Lanes, Simd, SimdLevel, Task, dispatch::call_avx512};
 
@@ -162,9 +162,20 @@ impl Simd for Avx512 {
     }
 
     #[inline(always)]
+    fn at_most(words: &[u32; 8], most: u32) -> u32 {
+        let most = call!(_mm256_set1_epi32(most.cast_signed()));
+        u32::from(call!(_mm256_cmple_epu32_mask(load_words(words), most)))
+    }
+
+    #[inline(always)]
     #[expect(clippy::cast_possible_truncation, reason = "a bit a lane")]
     fn descending(numbers: F32x8, chosen: u32, words: &[u32; 8], to_keys: &mut [u32; 8], to_words: &mut [u32; 8]) {
-        sort(call!(_mm256_maskz_mov_epi32(chosen as u8, keys(numbers))), words, to_keys, to_words);
+        if chosen.count_ones() <= 4 {
+            let keys = call!(_mm256_maskz_compress_epi32(chosen as u8, keys(numbers)));
+            sort_four(keys, words, to_keys, to_words);
+        } else {
+            sort(call!(_mm256_maskz_mov_epi32(chosen as u8, keys(numbers))), words, to_keys, to_words);
+        }
     }
 
     #[inline(always)]

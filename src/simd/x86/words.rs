@@ -52,15 +52,41 @@ pub(super) fn sort(keys: __m256i, words: &[u32; 8], to_keys: &mut [u32; 8], to_w
     store_words(call!(_mm256_permutevar8x32_epi32(load_words(words), keys)), to_words);
 }
 
-/// For every choice among eight lanes, the chosen ones in order.
+/// As [`sort`] for keys whose upper four lanes are 0.
+#[inline(always)]
+pub(super) fn sort_four(keys: __m256i, words: &[u32; 8], to_keys: &mut [u32; 8], to_words: &mut [u32; 8]) {
+    const PAIRS: i32 = 0b10_11_00_01;
+    const MIRROR: i32 = 0b00_01_10_11;
+    let keys = call!(_mm256_castsi256_si128(keys));
+    let keys = exchanged_four::<0b1010>(keys, call!(_mm_shuffle_epi32::<PAIRS>(keys)));
+    let keys = exchanged_four::<0b1100>(keys, call!(_mm_shuffle_epi32::<MIRROR>(keys)));
+    let keys = exchanged_four::<0b1010>(keys, call!(_mm_shuffle_epi32::<PAIRS>(keys)));
+    store_four(keys, to_keys);
+    let words = call!(_mm256_permutevar8x32_epi32(load_words(words), call!(_mm256_castsi128_si256(keys))));
+    store_four(call!(_mm256_castsi256_si128(words)), to_words);
+}
+
+#[inline(always)]
+fn exchanged_four<const LESSER: i32>(keys: __m128i, other: __m128i) -> __m128i {
+    let (greater, lesser) = (call!(_mm_max_epu32(keys, other)), call!(_mm_min_epu32(keys, other)));
+    call!(_mm_blend_epi32::<LESSER>(greater, lesser))
+}
+
+#[inline(always)]
+fn store_four(words: __m128i, to: &mut [u32; 8]) {
+    // SAFETY: the array is longer than the unaligned store.
+    unsafe { _mm_storeu_si128(to.as_mut_ptr().cast(), words) };
+}
+
+/// For every choice among eight lanes, the chosen ones in order, then the others.
 pub(super) static COMPRESS: [[u32; 8]; 256] = {
     let mut table = [[0; 8]; 256];
     let mut chosen = 0;
     while chosen < 256 {
         let (mut lane, mut len) = (0_u32, 0);
-        while lane < 8 {
-            if chosen >> lane & 1 == 1 {
-                table[chosen][len] = lane;
+        while lane < 16 {
+            if (chosen >> (lane % 8) & 1 == 1) == (lane < 8) {
+                table[chosen][len] = lane % 8;
                 len += 1;
             }
             lane += 1;
