@@ -29,7 +29,7 @@
 //! |---|---|---|
 //! | [`triangles_meet`], [`triangle_contact`] | whether two closed triangles share a point, and which | exact for every finite input |
 //! | [`triangle_meets_box`] | whether a triangle touches a box | exact |
-//! | [`triangle_meets_sphere`], [`triangle_meets_capsule`] | whether it touches a ball or a capsule | in f64 |
+//! | [`triangle_meets_sphere`], [`triangle_meets_capsule`] | whether it touches a ball or a capsule | exact |
 //! | [`closest_on_triangle`], [`triangle_distance`] | nearest points | in f64; 0 exactly for triangles that meet |
 //! | [`boxes_meet`], [`box_pairs`] | which closed boxes share a point | exact, infinite bounds included |
 //! | [`sweep_box`] | when a moving box first touches one at rest | exact decision, times within 2^-51 |

@@ -18,14 +18,14 @@ use crate::{
 pub enum Shape<'a> {
     /// An axis-aligned box; infinite bounds are legal. Exact.
     Box(Aabb),
-    /// A ball. Decided in f64.
+    /// A ball. Exact.
     Sphere {
         /// Its centre.
         center: Vec3,
         /// Its radius, not negative.
         radius: f32,
     },
-    /// All within a distance of a segment. Decided in f64.
+    /// All within a distance of a segment. Exact.
     Capsule {
         /// One end of the segment.
         from: Vec3,

@@ -21,9 +21,11 @@ mod measure;
 mod ratio;
 mod side;
 mod volumes;
+mod within;
 
 pub use estimate::{BOUND, Quotients};
 pub use hit::{RayRange, TriangleHit};
 pub use measure::{area, volume};
 pub use ratio::Ratio;
 pub use side::{side, slope};
+pub use within::{point_within, segments_within};

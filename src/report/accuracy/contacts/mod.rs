@@ -392,7 +392,7 @@ impl Bench<'_> {
             #[expect(clippy::cast_precision_loss, reason = "below 2^24")]
             let size = |radius: i64| radius as f32 * UNIT;
             self.row(
-                of("triangle_meets_sphere"),
+                ("triangle_meets_sphere", Kind::Exact, name),
                 &cases,
                 |(_, radius, [a, b])| triangle_meets_sphere(b, a[0], size(*radius)),
                 |([a, b], radius, _), &found| {
@@ -400,7 +400,7 @@ impl Bench<'_> {
                 },
             )?;
             self.row(
-                of("triangle_meets_capsule"),
+                ("triangle_meets_capsule", Kind::Exact, name),
                 &cases,
                 |(_, radius, [a, b])| triangle_meets_capsule(b, a[0], a[1], size(*radius)),
                 |([a, b], radius, _), &found| {
