@@ -9,6 +9,7 @@ use crate::{
         sah,
     },
     geom::{Aabb, Triangles},
+    simd::{Simd, SimdLevel, Task, dispatch},
 };
 
 /// Subtrees of fewer nodes are refitted by one task.
@@ -52,9 +53,7 @@ pub(in crate::accel) trait Item<N: WideNode>: Sized + Send {
     fn leaf(items: &mut [Self], own: Range<usize>, prims: &Triangles<'_>) -> Swept;
 
     /// Refits a subtree that one task takes.
-    fn small<B: Store<N>, R: Items<N>>(subtree: &mut Subtree<'_, N, Self, B, R>, prims: &Triangles<'_>) -> Swept {
-        subtree.node(subtree.first_node, prims)
-    }
+    fn small<B: Store<N>, R: Items<N>>(subtree: &mut Subtree<'_, N, Self, B, R>, prims: &Triangles<'_>) -> Swept;
 }
 
 impl<N: WideNode> Item<N> for TriBlock {
@@ -68,6 +67,42 @@ impl<N: WideNode> Item<N> for TriBlock {
         }
         swept.cost = sah::half_area(swept.aabb) * sah::COST_BLOCK * span;
         swept
+    }
+
+    fn small<B: Store<N>, R: Items<N>>(subtree: &mut Subtree<'_, N, Self, B, R>, prims: &Triangles<'_>) -> Swept {
+        let number = subtree.first_node;
+        dispatch(SimdLevel::best(), Below { subtree, number, prims })
+    }
+}
+
+/// A node of a subtree and what is below it.
+struct Below<'a, 's, N, B, R> {
+    subtree: &'a mut Subtree<'s, N, TriBlock, B, R>,
+    number: usize,
+    prims: &'a Triangles<'a>,
+}
+
+impl<N: WideNode, B: Store<N>, R: Items<N>> Task for Below<'_, '_, N, B, R> {
+    type Output = Swept;
+
+    /// Depth first; the builder bounds the depth.
+    #[inline(always)]
+    fn run<S: Simd>(self) -> Swept {
+        let Self { subtree, number, prims } = self;
+        let mut aabbs = [Aabb::EMPTY; WIDTH];
+        let mut all = Swept::EMPTY;
+        for slot in 0..WIDTH {
+            let word = subtree.nodes[number - subtree.first_node].word(slot);
+            let swept = if word.is_leaf() {
+                subtree.leaf(word, prims)
+            } else {
+                visited(S::call(Below { subtree: &mut *subtree, number: word.index(), prims }))
+            };
+            aabbs[slot] = swept.aabb;
+            all = all.plus(swept);
+        }
+        subtree.store.store(number, &aabbs, &mut subtree.nodes[number - subtree.first_node]);
+        all
     }
 }
 
@@ -149,20 +184,6 @@ impl<N: WideNode, L: Item<N>, B: Store<N>, R: Items<N>> Subtree<'_, N, L, B, R> 
         }
         let own = (self.own)(word);
         L::leaf(self.items, own.start - self.first_item..own.end - self.first_item, prims)
-    }
-
-    /// Depth first; the builder bounds the depth.
-    fn node(&mut self, number: usize, prims: &Triangles<'_>) -> Swept {
-        let mut aabbs = [Aabb::EMPTY; WIDTH];
-        let mut all = Swept::EMPTY;
-        for (slot, aabb) in aabbs.iter_mut().enumerate() {
-            let word = self.nodes[number - self.first_node].word(slot);
-            let swept = if word.is_leaf() { self.leaf(word, prims) } else { visited(self.node(word.index(), prims)) };
-            *aabb = swept.aabb;
-            all = all.plus(swept);
-        }
-        self.store.store(number, &aabbs, &mut self.nodes[number - self.first_node]);
-        all
     }
 }
 
