@@ -44,6 +44,12 @@ impl Options {
     }
 }
 
+/// What rays are aimed at, how many go together, and whether they come from outside.
+type Kind = (Aim, usize, bool);
+
+/// Rays from inside; packets of rays anywhere point apart.
+const INSIDE: [Kind; 3] = [(Aim::Anywhere, 1, false), (Aim::Anywhere, PACKET, false), (Aim::Packets, PACKET, false)];
+
 /// A mesh with all that looks at it.
 struct Subject {
     mesh: Closed,
@@ -78,9 +84,8 @@ impl Subject {
     }
 
     /// Casts one batch; judges its first `judged` rays.
-    fn batch(&self, aim: Aim, outside: bool, batch: u64, judged: usize) -> Outcome {
+    fn batch(&self, (aim, packet, outside): Kind, batch: u64, judged: usize) -> Outcome {
         let rays = self.mesh.rays(aim, outside, batch);
-        let packet = if aim == Aim::Packets { PACKET } else { 1 };
         let hits = self.hits(&rays, packet);
         let missed = hits.iter().filter(|h| h.is_none()).count() as u64;
         let mut tally = Tally::default();
@@ -91,11 +96,11 @@ impl Subject {
     }
 
     /// Casts at least `rays`, of which at least `judged` are judged.
-    fn cast(&self, aim: Aim, outside: bool, rays: u64, judged: u64) -> Outcome {
+    fn cast(&self, kind: Kind, rays: u64, judged: u64) -> Outcome {
         let size = BATCH as u64;
         let batches = rays.div_ceil(size);
         let each = usize::try_from(judged.div_ceil(batches.max(1)).min(size)).unwrap_or(BATCH);
-        (0..batches).into_par_iter().map(|b| self.batch(aim, outside, b, each)).reduce(Outcome::default, Outcome::plus)
+        (0..batches).into_par_iter().map(|b| self.batch(kind, b, each)).reduce(Outcome::default, Outcome::plus)
     }
 }
 
@@ -104,7 +109,7 @@ pub(crate) fn run(words: &[String]) -> Result<bool, String> {
     let options = Options::parse(words)?;
     println!("structure {}, kernels for {}", options.accel, options.simd);
     println!(
-        "mesh | rays | cast | leaks | judged | missed | false | wrong | ties | inexact | zeros lost | u, v [2^-24] | s"
+        "mesh | rays | as | cast | leaks | judged | missed | false | wrong | ties | inexact | zeros lost | u, v [2^-24] | s"
     );
     let (mut inside, mut aimed) = (Outcome::default(), Outcome::default());
     for (size, percent) in SIZES {
@@ -112,26 +117,30 @@ pub(crate) fn run(words: &[String]) -> Result<bool, String> {
             let prims = mesh.subject.prims();
             let accel = options.accel.build(&prims).map_err(|e| e.to_string())?;
             let subject = Subject { reference: Reference::new(&prims), accel, simd: options.simd, mesh };
-            for aim in [Aim::Anywhere, Aim::Packets] {
-                let share = |total: u64| (total * percent).div_ceil(100 * 6);
-                inside = inside.plus(shown(&subject, aim, false, [share(options.rays), share(options.judged)]));
+            for kind in INSIDE {
+                let share = |total: u64| (total * percent).div_ceil(100 * 9);
+                inside = inside.plus(shown(&subject, kind, [share(options.rays), share(options.judged)]));
             }
-            for (aim, outside) in Aim::AT_EDGES.into_iter().flat_map(|a| [(a, false), (a, true)]) {
-                let share = options.aimed.div_ceil(SIZES.len() as u64 * 3 * 6);
-                aimed = aimed.plus(shown(&subject, aim, outside, [share; 2]));
+            for aim in Aim::AT_EDGES {
+                for kind in [(aim, 1, false), (aim, PACKET, false), (aim, 1, true), (aim, PACKET, true)] {
+                    let share = options.aimed.div_ceil(SIZES.len() as u64 * 3 * 12);
+                    aimed = aimed.plus(shown(&subject, kind, [share; 2]));
+                }
             }
         }
     }
     Ok([("from inside", &inside), ("aimed", &aimed)].map(|(name, outcome)| conclude(name, outcome)) == [true; 2])
 }
 
-fn shown(subject: &Subject, aim: Aim, outside: bool, [rays, judged]: [u64; 2]) -> Outcome {
+fn shown(subject: &Subject, kind: Kind, [rays, judged]: [u64; 2]) -> Outcome {
     let start = Instant::now();
-    let outcome = subject.cast(aim, outside, rays, judged);
+    let outcome = subject.cast(kind, rays, judged);
     let Outcome { cast, leaks, tally: t } = &outcome;
+    let (aim, packet, outside) = kind;
     let (name, side) = (&subject.mesh.subject.name, if outside { ", from outside" } else { "" });
+    let cast_as = if packet == 1 { "single" } else { "packets" };
     println!(
-        "{name} | {}{side} | {cast} | {leaks} | {} | {} | {} | {} | {} | {} | {} | {:.3} | {:.1}",
+        "{name} | {}{side} | {cast_as} | {cast} | {leaks} | {} | {} | {} | {} | {} | {} | {} | {:.3} | {:.1}",
         aim.name(),
         t.rays,
         t.false_misses,

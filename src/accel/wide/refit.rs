@@ -91,14 +91,14 @@ impl<N: WideNode, B: Store<N>, R: Items<N>> Task for Below<'_, '_, N, B, R> {
         let Self { subtree, number, prims } = self;
         let mut aabbs = [Aabb::EMPTY; WIDTH];
         let mut all = Swept::EMPTY;
-        for slot in 0..WIDTH {
+        for (slot, aabb) in aabbs.iter_mut().enumerate() {
             let word = subtree.nodes[number - subtree.first_node].word(slot);
             let swept = if word.is_leaf() {
                 subtree.leaf(word, prims)
             } else {
                 visited(S::call(Below { subtree: &mut *subtree, number: word.index(), prims }))
             };
-            aabbs[slot] = swept.aabb;
+            *aabb = swept.aabb;
             all = all.plus(swept);
         }
         subtree.store.store(number, &aabbs, &mut subtree.nodes[number - subtree.first_node]);
