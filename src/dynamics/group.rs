@@ -29,8 +29,9 @@ const FAST_COST: f64 = 1.15;
 /// Frames that a rebuild takes when nobody knows.
 const UNKNOWN_LAG: u64 = 8;
 
-/// Decay during the build of a good tree from which on a fast one is better: that is ready in a third of the time and has decayed by a third.
-const HASTE: f64 = 0.2;
+/// Decay during the build of a good tree from which on a fast one is better. Before the next swap a tree has decayed for two builds: a good one to 1 and twice this, a
+/// fast one, ready in a third of the time, to [`FAST_COST`] and two thirds of this.
+const HASTE: f64 = 0.12;
 
 /// A group of the loop: its vertices and structure of the last frame, and buffers for the next one.
 #[derive(Debug)]
