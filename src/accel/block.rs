@@ -67,20 +67,14 @@ impl TriBlock {
 
     /// The blocks of these triangles, in order; the last may be short.
     pub(super) fn of(prims: &[u32]) -> impl Iterator<Item = Self> + '_ {
-        prims.chunks(BLOCK).map(|chunk| {
-            let mut lanes = [NO_PRIM; BLOCK];
-            lanes[..chunk.len()].copy_from_slice(chunk);
-            Self::new(lanes)
-        })
+        prims.chunks(BLOCK).map(Self::of_up_to_four)
     }
 
-    /// Appends [`TriBlock::of`].
-    pub(super) fn push(prims: &[u32], out: &mut Vec<Self>) {
-        for chunk in prims.chunks(BLOCK) {
-            let mut lanes = [NO_PRIM; BLOCK];
-            lanes[..chunk.len()].copy_from_slice(chunk);
-            out.push(Self::new(lanes));
-        }
+    /// The block of up to four triangles.
+    pub(super) fn of_up_to_four(prims: &[u32]) -> Self {
+        let mut lanes = [NO_PRIM; BLOCK];
+        lanes[..prims.len()].copy_from_slice(prims);
+        Self::new(lanes)
     }
 
     /// Triangles of the block, in lane order.

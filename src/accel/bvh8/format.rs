@@ -32,10 +32,13 @@ pub(in crate::accel) trait Format: Sized + Clone + Debug + Send + Sync + 'static
     const MOST: usize;
     const STORE: Self::Store;
 
-    /// How many items so many blocks and triangles take.
-    fn room(blocks: usize, triangles: usize) -> usize;
-    /// Appends the items of a leaf with these triangles.
-    fn push_leaf(own: &[u32], prims: &Triangles<'_>, items: &mut Vec<Self::Item>) -> Link;
+    /// Most triangles of an item.
+    const RUN: usize;
+
+    /// An item of these triangles, at least one.
+    fn item(own: &[u32], prims: &Triangles<'_>) -> Self::Item;
+    /// A leaf of so many triangles whose items begin there.
+    fn leaf(first: usize, triangles: usize) -> Link;
     /// The items of a leaf that has some.
     fn own(link: Link) -> Range<usize>;
     /// How many blocks a leaf has that has some.

@@ -48,14 +48,14 @@ impl Format for Full {
     const MOST: usize = MAX_BLOCKS;
     const STORE: IntoNodes = IntoNodes;
 
-    fn room(blocks: usize, _triangles: usize) -> usize {
-        blocks
+    const RUN: usize = BLOCK;
+
+    fn item(own: &[u32], _prims: &Triangles<'_>) -> TriBlock {
+        TriBlock::of_up_to_four(own)
     }
 
-    fn push_leaf(own: &[u32], _prims: &Triangles<'_>, blocks: &mut Vec<TriBlock>) -> Link {
-        let first = blocks.len();
-        TriBlock::push(own, blocks);
-        Link::leaf(first, blocks.len() - first)
+    fn leaf(first: usize, triangles: usize) -> Link {
+        Link::leaf(first, TriBlock::count_for(triangles))
     }
 
     #[inline(always)]

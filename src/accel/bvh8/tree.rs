@@ -1,5 +1,7 @@
 //! The tree of any format: build, refit and queries.
 
+use rayon::prelude::*;
+
 use super::{
     Bvh8Config,
     format::Format,
@@ -81,31 +83,27 @@ impl<F: Format> Tree for Tree8<F> {
 }
 
 impl<F: Format> Tree8<F> {
-    /// Makes leaves and nodes over a wide topology.
+    /// Makes leaves and nodes over a wide topology, whose leaves own all triangles in order.
     fn emit(&mut self, topology: &[[Child; WIDTH]], order: &[u32], prims: &Triangles<'_>) {
-        self.nodes.reserve_exact(topology.len());
-        self.items.reserve_exact(F::room(blocks(topology), order.len()));
-        for children in topology {
-            let mut links = [Link::NONE; WIDTH];
-            for slot in 0..WIDTH {
-                if let Child::Inner(node) = children[slot] {
-                    links[slot] = Link::inner(node as usize);
-                }
-            }
-            self.nodes.push(F::Node::new(links));
-        }
-        self.number_leaves(topology, (order, prims), 0);
+        topology.par_iter().map(node_of::<F>).collect_into_vec(&mut self.nodes);
+        let mut starts = Vec::with_capacity(order.len() / F::RUN + topology.len());
+        self.number_leaves(topology, &mut starts, 0);
+        let items = starts.par_iter().enumerate().map(|(i, &start)| {
+            let end = starts.get(i + 1).map_or(order.len(), |&next| next as usize);
+            F::item(&order[start as usize..end], prims)
+        });
+        items.collect_into_vec(&mut self.items);
     }
 
-    /// Makes all leaves below a node, depth first.
-    fn number_leaves(&mut self, topology: &[[Child; WIDTH]], (order, prims): (&[u32], &Triangles<'_>), number: usize) {
+    /// Links all leaves below a node, depth first; `starts` are the first triangles of the items so far.
+    fn number_leaves(&mut self, topology: &[[Child; WIDTH]], starts: &mut Vec<u32>, number: usize) {
         for (slot, child) in topology[number].iter().enumerate() {
             match *child {
                 Child::None => {}
-                Child::Inner(below) => self.number_leaves(topology, (order, prims), below as usize),
+                Child::Inner(below) => self.number_leaves(topology, starts, below as usize),
                 Child::Leaf { first, count } => {
-                    let own = &order[first as usize..][..count as usize];
-                    self.nodes[number].set_link(slot, F::push_leaf(own, prims, &mut self.items));
+                    self.nodes[number].set_link(slot, F::leaf(starts.len(), count as usize));
+                    starts.extend((first..first + count).step_by(F::RUN));
                 }
             }
         }
@@ -135,15 +133,15 @@ impl<F: Format> Tree8<F> {
     }
 }
 
-/// Blocks that the leaves of a wide topology take.
-fn blocks(topology: &[[Child; WIDTH]]) -> usize {
-    let mut blocks = 0;
-    for child in topology.as_flattened() {
-        if let Child::Leaf { count, .. } = *child {
-            blocks += TriBlock::count_for(count as usize);
+/// A node whose boxes and leaves are still to come.
+fn node_of<F: Format>(children: &[Child; WIDTH]) -> F::Node {
+    let mut links = [Link::NONE; WIDTH];
+    for slot in 0..WIDTH {
+        if let Child::Inner(node) = children[slot] {
+            links[slot] = Link::inner(node as usize);
         }
     }
-    blocks
+    F::Node::new(links)
 }
 
 impl<F: Format> Refittable for Tree8<F> {

@@ -33,14 +33,14 @@ impl Format for Compact {
     const MOST: usize = Link::MOST_IN_RUNS;
     const STORE: IntoSteps = IntoSteps;
 
-    fn room(_blocks: usize, triangles: usize) -> usize {
-        triangles
+    const RUN: usize = 1;
+
+    fn item(own: &[u32], prims: &Triangles<'_>) -> Corners {
+        Corners::new(own[0], prims)
     }
 
-    fn push_leaf(own: &[u32], prims: &Triangles<'_>, items: &mut Vec<Corners>) -> Link {
-        let first = items.len();
-        items.extend(own.iter().map(|&prim| Corners::new(prim, prims)));
-        Link::run(first, own.len())
+    fn leaf(first: usize, triangles: usize) -> Link {
+        Link::run(first, triangles)
     }
 
     #[inline(always)]
