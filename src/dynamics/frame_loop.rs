@@ -18,7 +18,7 @@ use crate::{
     world::{TopKind, World},
 };
 
-/// Decay of a structure at which a background rebuild is begun.
+/// A background rebuild is begun when a structure will have decayed to this by the time that it is ready.
 const DECAYED: f64 = 1.1;
 
 /// Rebuilds are handed to the builder until this many triangles wait there; at least one is.
@@ -266,7 +266,7 @@ impl FrameLoop {
             }
             RebuildPolicy::Async | RebuildPolicy::Auto => {
                 while self.stage.rebuilding_triangles() < QUEUED_TRIANGLES {
-                    let Some(number) = self.stage.most_decayed(DECAYED) else { break };
+                    let Some(number) = self.stage.most_decayed(DECAYED, self.counts.frames) else { break };
                     self.begin(number)?;
                 }
                 Ok(())

@@ -53,6 +53,8 @@ pub(super) struct Group {
     built_of: u64,
     /// The vertices of the frame before, where they moved since and somebody asks for them.
     before: Option<Arc<Vec<Vec3>>>,
+    /// By how much the decay grew with the last refit.
+    growth: f64,
     /// Frames that the last background rebuild took.
     lag: u64,
     /// Frames that one by the builder of good trees takes, if that is known.
@@ -119,6 +121,7 @@ impl Group {
             moved_since_build: false,
             built_of: 0,
             before: None,
+            growth: 0.0,
             lag: 0,
             full_lag: None,
             is_fast: false,
@@ -169,7 +172,16 @@ impl Group {
 
     /// Brings the structure to the vertices: takes a finished rebuild, refits or builds, in the current rayon pool.
     pub(super) fn update(&mut self, spec: &AccelSpec, rebuild_always: bool, frame: u64) {
+        let quality = self.quality();
         self.outcome = self.try_update(spec, rebuild_always, frame);
+        match &self.outcome {
+            Ok(work) if work.refits > 0 && work.swaps + work.dropped == 0 => {
+                self.growth = (self.quality() - quality).max(0.0);
+            }
+            // The motion goes on.
+            Ok(work) if self.deformed && work.swaps + work.dropped > 0 => {}
+            _ => self.growth = 0.0,
+        }
         if self.outcome.is_err() {
             // Without a structure the next frame deforms and builds anew.
             self.accel = None;
@@ -323,6 +335,13 @@ impl Group {
         if self.is_fast { self.quality().max(1.0) * FAST_COST } else { self.quality() }
     }
 
+    /// The same once a rebuild that is begun now is ready, if the tree goes on to decay as it did last.
+    #[expect(clippy::cast_precision_loss, reason = "few frames")]
+    pub(super) fn excess_to_come(&self, frame: u64) -> f64 {
+        let lag = self.full_lag.map_or(0, |full| if self.is_hasty(frame) { full.div_ceil(FAST_GAIN) } else { full });
+        self.excess() + self.growth * lag as f64
+    }
+
     /// True while the tree in use is not what this motion, or rest, calls for.
     #[cfg(test)]
     pub(super) fn wants_good_tree(&self) -> bool {
@@ -333,7 +352,7 @@ impl Group {
     #[expect(clippy::cast_precision_loss, reason = "few frames")]
     fn is_hasty(&self, frame: u64) -> bool {
         let per_frame = (self.quality() - 1.0) / self.tree_age(frame).max(1) as f64;
-        per_frame * self.full_lag.unwrap_or(UNKNOWN_LAG) as f64 > HASTE
+        per_frame.max(self.growth) * self.full_lag.unwrap_or(UNKNOWN_LAG) as f64 > HASTE
     }
 
     /// Frames between `frame` and the one that the structure was built from; 0 when nothing moved since.

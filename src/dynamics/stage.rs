@@ -264,12 +264,13 @@ impl Stage {
         self.groups.iter().map(Group::quality).fold(1.0, f64::max)
     }
 
-    /// The group with the worst decay above `limit` that can be rebuilt, the earliest of equals.
-    pub(super) fn most_decayed(&self, limit: f64) -> Option<usize> {
+    /// The group with the worst decay above `limit` that can be rebuilt, by the time that it would be; the earliest of equals.
+    pub(super) fn most_decayed(&self, limit: f64, frame: u64) -> Option<usize> {
         let mut worst = (limit, None);
         for (number, group) in self.groups.iter().enumerate() {
-            if group.excess() > worst.0 && group.wants_rebuild() {
-                worst = (group.excess(), Some(number));
+            let excess = group.excess_to_come(frame);
+            if excess > worst.0 && group.wants_rebuild() {
+                worst = (excess, Some(number));
             }
         }
         worst.1

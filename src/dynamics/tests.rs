@@ -286,3 +286,21 @@ fn swaps_at_given_frames_are_of_good_trees() {
     until_swapped(&mut frames, 5, |frame| f64::from(frame % 20) * 0.1);
     assert_eq!(frames.counts().fast_rebuilds, 0);
 }
+
+#[test]
+fn decay_is_foreseen_while_things_move_and_none_when_they_rest() {
+    let mut frames = FrameLoop::new(config("bvh8", RebuildPolicy::Async)).unwrap();
+    frames.add(Arc::new(burst(3000)), DAffine3::IDENTITY);
+    // How long a rebuild takes is known after one.
+    until_swapped(&mut frames, 1, |frame| f64::from(frame % 20) * 0.1);
+    let mut foreseen = |time_s: f64| {
+        frames.advance(&[&at(time_s)]).unwrap();
+        let (group, frame) = (&frames.stage.groups[0], frames.counts().frames);
+        let more = group.excess_to_come(frame) - group.excess();
+        assert!(more >= 0.0, "{more}");
+        more
+    };
+    assert!((0..100).any(|frame| foreseen(0.02 * f64::from(frame)) > 0.0));
+    foreseen(0.7);
+    assert_eq!(foreseen(0.7), 0.0);
+}
