@@ -321,3 +321,36 @@ pub(super) fn round_up(t: f64) -> f32 {
     let step = i32::from(f64::from(near) < t) * (bits >> 31 | 1);
     f32::from_bits(bits.wrapping_add(step).cast_unsigned())
 }
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn number() -> impl Strategy<Value = f64> {
+        let bits = any::<u32>().prop_map(|bits| f64::from(f32::from_bits(bits)));
+        let near = (bits.clone(), -3_i64..4).prop_map(|(x, steps)| {
+            f64::from_bits(x.to_bits().saturating_add_signed(steps)) // a few steps of f64 from an f32
+        });
+        prop_oneof![
+            bits,
+            near,
+            any::<f64>(),
+            Just(0.0),
+            Just(-0.0),
+            Just(1e-60),
+            Just(-1e-60),
+            Just(f64::from(f32::MAX))
+        ]
+    }
+
+    proptest! {
+        #[test]
+        fn rounding_up_gives_the_least_number_that_is_not_below(t in number()) {
+            prop_assume!(t.abs() <= f64::from(f32::MAX));
+            let up = round_up(t);
+            prop_assert!(f64::from(up) >= t && f64::from(up.next_down()) < t, "{} for {}", up, t);
+        }
+    }
+}

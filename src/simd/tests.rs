@@ -269,6 +269,20 @@ impl Task for Selection {
     }
 }
 
+struct AtMost {
+    words: [u32; 8],
+    most: u32,
+}
+
+impl Task for AtMost {
+    type Output = u32;
+
+    #[inline(always)]
+    fn run<S: Simd>(self) -> u32 {
+        S::at_most(&self.words, self.most)
+    }
+}
+
 proptest! {
     #[test]
     fn chosen_lanes_are_kept_in_order_and_sorted_by_their_numbers(
@@ -287,6 +301,15 @@ proptest! {
                 let floor = key_floor(key);
                 prop_assert!(key > 0 && floor <= numbers[lane] && numbers[lane].to_bits() - floor.to_bits() < 8);
             }
+        }
+    }
+
+    #[test]
+    fn words_up_to_another_are_found(words in prop::array::uniform8(any::<u32>()), most in any::<u32>(), at in 0..16_usize) {
+        let most = *words.get(at).unwrap_or(&most);
+        let due = (0..8).filter(|&i| words[i] <= most).map(|i| 1 << i).sum::<u32>();
+        for level in SimdLevel::available() {
+            prop_assert_eq!(dispatch(level, AtMost { words, most }), due, "{}", level);
         }
     }
 
