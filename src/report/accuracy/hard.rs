@@ -46,7 +46,7 @@ const fn row(trials: &'static str, what: &'static str, measured: [f64; 3], most:
 pub const FAST_BOUNDS: &[FastBound] = &[
     row("H1", "sphere, rays from inside at corners, edges and anywhere", [18.0, 0.0, 16.0], [25.0, 0.0, 25.0]),
     row("H2", "lattice, directions with zeros and denormals", [2.1, 3.6, 4.3], [5.0, 6.0, 8.0]),
-    row("H3 near", "sphere moved by up to 2^15", [0.001, 0.0, 0.0], [0.02, 0.0, 0.02]),
+    row("H3 near", "sphere moved by up to 2^15", [0.051, 0.0, 0.01], [0.5, 0.0, 0.2]),
     row("H3 far", "sphere moved by 2^16 to 2^18", [0.2, 0.0, 0.07], [1.0, 0.0, 0.5]),
     row(
         "H3 farthest",
@@ -59,9 +59,10 @@ pub const FAST_BOUNDS: &[FastBound] = &[
     row("H5 needles", "needles of aspect 10^3 to 10^7", [32.8, 8.2, 0.5], [50.0, 15.0, 2.0]),
     row("H5 area", "needles: triangles without area are never hit", [0.0, 8.2, 0.0], [0.0, 15.0, 0.0]),
     row("H5 fan", "fan of 10^4 slivers", [5.0, 0.0, 16.7], [15.0, 0.0, 30.0]),
-    row("H6 level", "coplanar layers", [0.25, 0.0, 2.5], [1.0, 0.0, 5.0]),
+    row("H6 level", "coplanar layers", [0.45, 0.0026, 2.5], [1.0, 0.02, 5.0]),
     row("H6 tilted", "coplanar layers, tilted", [2.4, 0.65, 15.1], [6.0, 2.0, 25.0]),
     row("H6 alike", "coplanar layers: all structures name the same triangle", [0.0, 0.0, 31.1], [0.0, 0.0, 50.0]),
+    row("H7 10^-1 rad", "plane, grazing", [0.0037, 0.0, 0.0079], [0.05, 0.0, 0.05]),
     row("H7 10^-2 rad", "plane, grazing", [0.04, 0.0, 0.04], [0.2, 0.0, 0.2]),
     row("H7 10^-3 rad", "plane, grazing", [0.07, 0.0, 0.1], [0.4, 0.0, 0.5]),
     row("H7 10^-4 rad", "plane, grazing", [0.7, 0.0, 0.9], [2.0, 0.0, 3.0]),
@@ -74,6 +75,7 @@ pub const FAST_BOUNDS: &[FastBound] = &[
         [0.0013, 0.0105, 0.0],
         [0.01, 0.05, 0.0],
     ),
+    row("H9 plate", "a single plate without depth", [0.0168, 0.0, 0.0], [0.1, 0.0, 0.0]),
     row("H9 plates", "plates on planes of the structures", [0.5, 0.0, 1.5], [2.0, 0.0, 4.0]),
     row("H9 gears", "gears", [1.6, 1.2, 10.5], [4.0, 4.0, 20.0]),
     row("H10 small", "coordinates below 10^-37, products of three below f32", [58.3, 0.0, 0.0], [80.0, 0.0, 0.0]),
