@@ -128,3 +128,30 @@ fn surely_within(nearest: &Nearest, points: &[Vec3], corners: &[Vec3; 3], radius
     let length = way.length();
     (parted > (radius + error) * length).then_some(false)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Triangles in the plane `2x + 3y + 6z = 0`, and points straight above points of them: 7 away for each (2, 3, 6).
+    #[test]
+    fn balls_and_capsules_that_just_touch_a_tilted_triangle_do() {
+        let (along, across, up) = (Vec3::new(3.0, -2.0, 0.0), Vec3::new(0.0, 2.0, -1.0), Vec3::new(2.0, 3.0, 6.0));
+        let mut cases = 0;
+        for size in [7.0_f32, 11.0, 13.0, 19.0, 23.0] {
+            let corners = [Vec3::ZERO, along * size, across * size].map(|c| c + Vec3::new(4097.0, -8193.0, 2049.0));
+            for (i, j) in (1..7_u8).flat_map(|i| (1..7 - i).map(move |j| (f32::from(i), f32::from(j)))) {
+                for k in [1.0_f32, 3.0, 5.0, 9.0, 27.0] {
+                    let center = corners[0] + along * i + across * j + up * k;
+                    let (far, radius) = (center + up + along, 7.0 * k);
+                    assert!(triangle_meets_sphere(&corners, center, radius), "{size} {i} {j} {k}");
+                    assert!(!triangle_meets_sphere(&corners, center, radius.next_down()), "{size} {i} {j} {k}");
+                    assert!(triangle_meets_capsule(&corners, center, far, radius), "{size} {i} {j} {k}");
+                    assert!(!triangle_meets_capsule(&corners, center, far, radius.next_down()), "{size} {i} {j} {k}");
+                    cases += 1;
+                }
+            }
+        }
+        assert_eq!(cases, 375);
+    }
+}
