@@ -71,7 +71,7 @@ pub fn triangle_distance(a: &[Vec3; 3], b: &[Vec3; 3]) -> Option<Nearest> {
 const EDGES: [(usize, usize); 3] = [(0, 1), (1, 2), (2, 0)];
 
 /// The point of a segment nearest to `p`.
-pub(super) fn to_segment(p: DVec3, ends: [DVec3; 2]) -> Nearest {
+fn to_segment(p: DVec3, ends: [DVec3; 2]) -> Nearest {
     Nearest::between(p, on_segment(p, ends))
 }
 

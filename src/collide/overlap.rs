@@ -73,7 +73,7 @@ fn parted_along(projection: Projection, &[a, b, c]: &[Vec3; 3], aabb: &Aabb) -> 
 
 /// True when a closed triangle and a closed ball share a point; exact.
 ///
-/// Cost: some 30 ns; where the distance is the radius but for roundings, some microseconds.
+/// Cost: some 100 ns; where the distance is the radius but for roundings, some microseconds.
 pub fn triangle_meets_sphere(corners: &[Vec3; 3], center: Vec3, radius: f32) -> bool {
     let finite = corners.iter().all(|p| p.is_finite()) && center.is_finite() && radius.is_finite();
     if !finite || radius < 0.0 {
@@ -85,7 +85,7 @@ pub fn triangle_meets_sphere(corners: &[Vec3; 3], center: Vec3, radius: f32) -> 
 
 /// True when a closed triangle and a closed capsule (all within `radius` of the segment from `from` to `to`) share a point; exact.
 ///
-/// Cost: some 300 ns; where the distance is the radius but for roundings, some microseconds.
+/// Cost: about a microsecond; where the distance is the radius but for roundings, some more.
 pub fn triangle_meets_capsule(corners: &[Vec3; 3], from: Vec3, to: Vec3, radius: f32) -> bool {
     let finite = corners.iter().chain([&from, &to]).all(|p| p.is_finite()) && radius.is_finite();
     if !finite || radius < 0.0 {

@@ -132,7 +132,7 @@ mod tests {
         product(&way, &way)
     }
 
-    /// The least squared distance from a triangle: by its plane's two directions made orthogonal, else by its edges.
+    /// The least squared distance from a triangle: from the foot on its plane where that lies inside, else from its edges.
     fn from_triangle(p: &Point, [a, b, c]: [&Point; 3]) -> BigRational {
         let edges = [[a, b], [b, c], [c, a]].map(|edge| apart(p, &on_segment(p, edge)));
         let least = edges.into_iter().min().expect("three");
@@ -151,7 +151,7 @@ mod tests {
         apart(p, &at(&at(a, &e, &u), &f, &v)).min(least)
     }
 
-    /// The least squared distance of two segments: alternately the best point of one for that of the other ends it where one of them stays; else the lines' own.
+    /// The least squared distance of two segments: of the feet of the lines' common perpendicular where both lie inside, else from an end.
     fn of_segments([a, b]: [&Point; 2], [c, d]: [&Point; 2]) -> BigRational {
         let ends = [(a, [c, d]), (b, [c, d]), (c, [a, b]), (d, [a, b])];
         let least = ends.map(|(p, segment)| apart(p, &on_segment(p, segment))).into_iter().min().expect("four");

@@ -28,6 +28,10 @@ pub(super) fn keys(numbers: F32x8) -> __m256i {
     call!(_mm256_add_epi32(high, low))
 }
 
+/// The lanes of each four with those of a pair changed, and in the opposite order.
+const PAIRS: i32 = 0b10_11_00_01;
+const MIRROR: i32 = 0b00_01_10_11;
+
 /// One step of a sorting network: of each pair of lanes, one here and one in `other`, the lesser goes to those whose bit is set in `LESSER`.
 #[inline(always)]
 pub(super) fn exchanged<const LESSER: i32>(keys: __m256i, other: __m256i) -> __m256i {
@@ -38,8 +42,6 @@ pub(super) fn exchanged<const LESSER: i32>(keys: __m256i, other: __m256i) -> __m
 /// Writes keys in descending order, and the words of their lanes.
 #[inline(always)]
 pub(super) fn sort(keys: __m256i, words: &[u32; 8], to_keys: &mut [u32; 8], to_words: &mut [u32; 8]) {
-    const PAIRS: i32 = 0b10_11_00_01;
-    const MIRROR: i32 = 0b00_01_10_11;
     const HALVES: i32 = 0b01_00_11_10;
     let keys = exchanged::<0b1010_1010>(keys, call!(_mm256_shuffle_epi32::<PAIRS>(keys)));
     let keys = exchanged::<0b1100_1100>(keys, call!(_mm256_shuffle_epi32::<MIRROR>(keys)));
@@ -55,8 +57,6 @@ pub(super) fn sort(keys: __m256i, words: &[u32; 8], to_keys: &mut [u32; 8], to_w
 /// As [`sort`] for keys whose upper four lanes are 0.
 #[inline(always)]
 pub(super) fn sort_four(keys: __m256i, words: &[u32; 8], to_keys: &mut [u32; 8], to_words: &mut [u32; 8]) {
-    const PAIRS: i32 = 0b10_11_00_01;
-    const MIRROR: i32 = 0b00_01_10_11;
     let keys = call!(_mm256_castsi256_si128(keys));
     let keys = exchanged_four::<0b1010>(keys, call!(_mm_shuffle_epi32::<PAIRS>(keys)));
     let keys = exchanged_four::<0b1100>(keys, call!(_mm_shuffle_epi32::<MIRROR>(keys)));
@@ -66,6 +66,7 @@ pub(super) fn sort_four(keys: __m256i, words: &[u32; 8], to_keys: &mut [u32; 8],
     store_four(call!(_mm256_castsi256_si128(words)), to_words);
 }
 
+/// As [`exchanged`], for four lanes.
 #[inline(always)]
 fn exchanged_four<const LESSER: i32>(keys: __m128i, other: __m128i) -> __m128i {
     let (greater, lesser) = (call!(_mm_max_epu32(keys, other)), call!(_mm_min_epu32(keys, other)));
