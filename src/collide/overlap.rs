@@ -154,4 +154,25 @@ mod tests {
         }
         assert_eq!(cases, 375);
     }
+
+    /// Distances that are whole numbers in truth and roundings away from them in f64.
+    #[test]
+    fn balls_on_a_grid_touch_as_integers_say_where_f64_errs() {
+        let mut state = 7_u64;
+        let mut below = |n: u64| {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 33) % n
+        };
+        let mut errors = 0;
+        for _ in 0..20_000 {
+            let mut point = || Vec3::from([0; 3].map(|_| f32::from(u8::try_from(below(5)).expect("below 5"))));
+            let (corners, center) = ([point(), point(), point()], point());
+            let radius = f32::from(u8::try_from(below(4)).expect("below 4"));
+            let due = point_within(center, &corners, radius);
+            assert_eq!(triangle_meets_sphere(&corners, center, radius), due, "{corners:?} {center} {radius}");
+            let nearest = to_triangle(center.as_dvec3(), &corners.map(Vec3::as_dvec3));
+            errors += u32::from((nearest.distance <= f64::from(radius)) != due);
+        }
+        assert!(errors > 0, "the cases are none that f64 errs in");
+    }
 }
