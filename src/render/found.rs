@@ -6,7 +6,7 @@ use super::{
     context::{FrameContext, InstanceInfo},
     material::{Binding, Channel, ShadeMaterial, tex_coord},
     patch::Patch,
-    texture::{Footprint, Pyramid, Source, sample},
+    texture::{Footprint, Pyramid, Source, sample, sample_one},
     wide::{Bits, Floats, LANES, Row, V2, V3, put2, put3},
 };
 use crate::{
@@ -82,6 +82,14 @@ impl<'a> Spots<'a> {
     pub(crate) fn patch<F: Floats>(&self) -> Patch<F> {
         let [a, b, c] = &self.corners;
         Patch::new([V3::load(a), V3::load(b), V3::load(c)], F::load(&self.u), F::load(&self.v))
+    }
+
+    /// Edges from the first corner to the second crossed with those to the third.
+    #[inline(always)]
+    pub(crate) fn cross<F: Floats>(&self) -> V3<F> {
+        let [a, b, c] = &self.corners;
+        let a = V3::<F>::load(a);
+        (V3::load(b) - a).cross(V3::load(c) - a)
     }
 
     /// Ray parameters.
@@ -320,6 +328,10 @@ impl<'a, 'b, F: Floats> Maps<'a, 'b, F> {
             Footprint { dx: placed.turn(du * right.x + dv * right.y), dy: placed.turn(du * down.x + dv * down.y) };
         let [w, u, v] = self.patch.weights;
         let uv = placed.turn(a * w + b * u + c * v) + placed.offset;
+        if let (Some(spot), Some(binding)) = (&self.spots.only, placed.bindings[0]) {
+            let source = Source { pyramid: &spot.pyramids[binding.pyramid as usize], sampler: binding.sampler };
+            return sample_one(&source, placed.mask, uv, &footprint);
+        }
         let mut sources = [None; LANES];
         for lane in Bits(placed.mask) {
             if let (Some(spot), Some(binding)) = (&self.spots.found[lane], placed.bindings[lane]) {

@@ -10,7 +10,7 @@ use std::ops::{Add, Mul, Neg, Sub};
 use glam::{Vec2, Vec3};
 
 use super::math;
-use crate::simd::{Array, Lanes};
+use crate::simd::{Array, Lanes, Texels};
 
 /// Most lanes.
 pub(crate) const LANES: usize = 16;
@@ -19,9 +19,9 @@ pub(crate) const LANES: usize = 16;
 pub(crate) type Row = [f32; LANES];
 
 /// Lanes of `f32`.
-pub(crate) trait Floats: Lanes<Elem = f32> {}
+pub(crate) trait Floats: Texels {}
 
-impl<F: Lanes<Elem = f32>> Floats for F {}
+impl<F: Texels> Floats for F {}
 
 /// A single lane.
 pub(crate) type One = Array<f32, 1>;

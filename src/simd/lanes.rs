@@ -3,7 +3,7 @@ use std::{
     ops::{Add, Div, Mul, Neg, Sub},
 };
 
-use super::{SimdLevel, Task};
+use super::{SimdLevel, Task, Texels};
 
 /// The wide types of one level. Only this module implements it; the types of levels that a machine may lack are
 /// private, so code runs with them only below [`super::dispatch`].
@@ -21,7 +21,7 @@ pub trait Simd: Copy + Send + Sync + 'static {
     /// Four f64: a block of four triangles.
     type D4: Lanes<Elem = f64>;
     /// The widest f32: one lane a ray of a packet.
-    type F: Lanes<Elem = f32>;
+    type F: Texels;
     /// Half as many f64 as there are lanes in `F`, or all of them where that is a single vector.
     type D: Lanes<Elem = f64>;
 

@@ -14,6 +14,7 @@ mod ordered;
 mod prefetch;
 mod scalar;
 mod stack;
+mod texels;
 #[cfg(target_arch = "x86_64")]
 mod x86;
 
@@ -26,6 +27,7 @@ pub use ordered::{LEAST_KEY, key_floor, last_key};
 pub use prefetch::{prefetch, prefetch_either};
 pub use scalar::{Array, Scalar};
 pub use stack::Stack;
+pub use texels::Texels;
 
 #[cfg(test)]
 mod float_mode_tests;

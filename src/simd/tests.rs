@@ -2,7 +2,7 @@
 
 use proptest::prelude::*;
 
-use super::{Halves, Lanes, Simd, SimdLevel, Stack, Task, dispatch, key_floor};
+use super::{Halves, Lanes, Simd, SimdLevel, Stack, Task, Texels, dispatch, key_floor};
 
 /// Bits of every operation's result on three rows of numbers; NaN of any kind is one value.
 struct Operations<'a> {
@@ -22,6 +22,12 @@ fn bits64(values: &[f64]) -> impl Iterator<Item = u64> + '_ {
 /// A byte of each of eight numbers.
 fn words_of(numbers: &[f32]) -> [u8; 8] {
     std::array::from_fn(|i| numbers[i].to_bits().to_le_bytes()[i % 4])
+}
+
+fn stored<V: Lanes<Elem = f32>>(lanes: V) -> [f32; 16] {
+    let mut row = [0.0; 16];
+    lanes.store(&mut row);
+    row
 }
 
 /// All operations on vectors of one type, over rows of 16 numbers; `zero` is any number.
@@ -57,6 +63,29 @@ fn each<V: Lanes>(a: &[V::Elem], b: &[V::Elem], zero: V::Elem) -> (Vec<V::Elem>,
 }
 
 impl Operations<'_> {
+    /// Texels, against what they are said to be.
+    #[inline(always)]
+    fn check_texels<S: Simd>(&self) {
+        let bytes: Vec<[u8; 4]> = self.a.iter().chain(self.b).map(|v| v.to_bits().to_le_bytes()).collect();
+        let words: Vec<[u16; 4]> =
+            bytes.iter().map(|b| b.map(|byte| u16::from(byte).wrapping_mul(257) ^ u16::from(b[0]))).collect();
+        let table: [f32; 256] = std::array::from_fn(|i| (i * i) as f32);
+        for len in [1, 7, bytes.len()] {
+            let places: [u32; 16] =
+                std::array::from_fn(|i| if i % 5 == 4 { u32::MAX >> i } else { self.b[i].to_bits() % 40 });
+            let fine = S::F::of_bytes(&bytes[..len], &table, &places).map(stored);
+            let coarse = S::F::of_words(&words[..len], &places).map(stored);
+            for lane in 0..S::F::LEN {
+                let place = (places[lane] as usize).min(len - 1);
+                let [r, g, b, a] = bytes[place];
+                let due = [table[r as usize], table[g as usize], table[b as usize], f32::from(a) * (1.0 / 255.0)];
+                assert!(bits32(&fine.map(|row| row[lane])).eq(bits32(&due)));
+                let due = words[place].map(|word| f32::from(word) * (1.0 / 65535.0));
+                assert!(bits32(&coarse.map(|row| row[lane])).eq(bits32(&due)));
+            }
+        }
+    }
+
     /// What takes triangles apart, against what it is said to give.
     #[inline(always)]
     fn check_triangles<S: Simd>(&self) {
@@ -170,6 +199,7 @@ impl Task for Operations<'_> {
         four.rotated().store(&mut row);
         out.extend(bits32(&row));
         self.check_triangles::<S>();
+        self.check_texels::<S>();
         let mut ends = [f32::INFINITY, f32::NEG_INFINITY];
         for first in (0..16).step_by(S::F::LEN) {
             let numbers: Vec<f32> = self.b.iter().map(|b| if b.is_nan() { 0.0 } else { *b }).collect();

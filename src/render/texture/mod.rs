@@ -8,4 +8,4 @@ mod pyramid;
 mod sample;
 
 pub(crate) use pyramid::{Encoding, Pyramid};
-pub(crate) use sample::{Footprint, Source, sample};
+pub(crate) use sample::{Footprint, Source, sample, sample_one};

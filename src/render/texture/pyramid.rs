@@ -2,7 +2,13 @@ use std::sync::Arc;
 
 use glam::Vec4;
 
-use crate::{render::tone::linear_from_srgb8, scene::Image};
+use crate::{
+    render::{
+        tone::linear_from_srgb8,
+        wide::{Floats, LANES, One, only},
+    },
+    scene::Image,
+};
 
 /// What the bytes of an image mean.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -18,8 +24,8 @@ pub(crate) enum Encoding {
 pub(crate) struct Level {
     pub(crate) width: u32,
     pub(crate) height: u32,
-    /// First texel in `coarse`; unused for level 0.
-    first: usize,
+    /// First texel in `coarse`, 0 for level 0.
+    pub(crate) first: u32,
 }
 
 /// An image with its coarser versions, each half the size of the one before, rounded down.
@@ -62,7 +68,7 @@ impl Pyramid {
             return false;
         }
         let (width, height) = ((above.width / 2).max(1), (above.height / 2).max(1));
-        let first = self.coarse.len();
+        let first = u32::try_from(self.coarse.len()).expect("fewer texels than the finest level, whose number fits");
         self.coarse.reserve(width as usize * height as usize);
         for y in 0..height {
             let (ys, wy) = taps(y, above.height, height);
@@ -107,90 +113,36 @@ impl Pyramid {
         self.levels[level]
     }
 
-    /// A level ready to be read.
-    #[inline(always)]
-    pub(crate) fn view(&self, level: usize) -> LevelView<'_> {
-        let Level { width, height, first } = self.levels[level];
-        let texels = if level == 0 {
-            Texels::Fine(self.fine.as_chunks().0, self.table)
-        } else {
-            Texels::Coarse(&self.coarse[first..])
-        };
-        LevelView { width, height, texels }
+    /// A texel in linear RGBA; row 0 is the top.
+    pub(crate) fn texel(&self, level: usize, x: u32, y: u32) -> Vec4 {
+        let Level { width, first, .. } = self.levels[level];
+        let mut places = [0; LANES];
+        places[0] = y * width + x + first;
+        Vec4::from(self.texels::<One>(&places, 1, u32::from(level == 0)).map(only))
     }
 
-    /// A texel in linear RGBA; row 0 is the top.
+    /// The texels of the lanes of `mask` in linear RGBA, where a place is a level's first texel with those before it in rows and columns; `finest` are the lanes
+    /// that read level 0.
     #[inline(always)]
-    pub(crate) fn texel(&self, level: usize, x: u32, y: u32) -> Vec4 {
-        self.view(level).texel(x, y)
+    pub(crate) fn texels<F: Floats>(&self, places: &[u32; LANES], mask: u32, finest: u32) -> [F; 4] {
+        if mask & finest == 0 {
+            return F::of_words(&self.coarse, places);
+        }
+        let fine = F::of_bytes(self.fine.as_chunks().0, self.table, places);
+        if mask & !finest == 0 {
+            return fine;
+        }
+        let mut out = F::of_words(&self.coarse, places);
+        for i in 0..4 {
+            out[i] = F::select(finest, fine[i], out[i]);
+        }
+        out
     }
 
     /// Bytes that the coarser levels take.
     pub(crate) fn coarse_bytes(&self) -> usize {
         self.coarse.len() * size_of::<[u16; 4]>()
     }
-}
-
-/// The texels of a level, as they are stored.
-#[derive(Clone, Copy, Debug)]
-enum Texels<'a> {
-    Fine(&'a [[u8; 4]], &'static [f32; 256]),
-    Coarse(&'a [[u16; 4]]),
-}
-
-/// A level of a pyramid, borrowed.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct LevelView<'a> {
-    pub(crate) width: u32,
-    pub(crate) height: u32,
-    texels: Texels<'a>,
-}
-
-impl LevelView<'_> {
-    /// A texel in linear RGBA; row 0 is the top.
-    #[inline(always)]
-    pub(crate) fn texel(&self, x: u32, y: u32) -> Vec4 {
-        let at = y as usize * self.width as usize + x as usize;
-        match self.texels {
-            Texels::Fine(texels, table) => fine(texels, table, at),
-            Texels::Coarse(texels) => coarse(texels[at]),
-        }
-    }
-
-    /// The texels of two columns in two rows, row by row.
-    #[inline(always)]
-    pub(crate) fn four(&self, [x0, x1]: [u32; 2], [y0, y1]: [u32; 2]) -> [Vec4; 4] {
-        // Numbers past 2^24 are not exact in f32.
-        let (x0, x1) = (x0.min(self.width - 1) as usize, x1.min(self.width - 1) as usize);
-        let row = |y: u32| y.min(self.height - 1) as usize * self.width as usize;
-        let (top, bottom) = (row(y0), row(y1));
-        let at = [top + x0, top + x1, bottom + x0, bottom + x1];
-        let mut out = [Vec4::ZERO; 4];
-        match self.texels {
-            Texels::Fine(texels, table) => {
-                for i in 0..4 {
-                    out[i] = fine(texels, table, at[i]);
-                }
-            }
-            Texels::Coarse(texels) => {
-                for i in 0..4 {
-                    out[i] = coarse(texels[at[i]]);
-                }
-            }
-        }
-        out
-    }
-}
-
-#[inline(always)]
-fn fine(texels: &[[u8; 4]], table: &[f32; 256], at: usize) -> Vec4 {
-    let [r, g, b, a] = texels[at];
-    Vec4::new(table[usize::from(r)], table[usize::from(g)], table[usize::from(b)], f32::from(a) * (1.0 / 255.0))
-}
-
-#[inline(always)]
-fn coarse([r, g, b, a]: [u16; 4]) -> Vec4 {
-    Vec4::new(f32::from(r), f32::from(g), f32::from(b), f32::from(a)) * (1.0 / 65535.0)
 }
 
 /// Source texels and weights of texel `i` of `to` averaged from `from` texels: two when `from` is even, three
@@ -260,7 +212,10 @@ pub(super) mod tests {
         }
         let last = pyramid.level_count() - 1;
         assert!((pyramid.texel(last, 0, 0) - mean).abs().max_element() < 1e-4);
-        assert_eq!(pyramid.level(last), Level { width: 1, height: 1, first: pyramid.coarse.len() - 1 });
+        assert_eq!(
+            pyramid.level(last),
+            Level { width: 1, height: 1, first: u32::try_from(pyramid.coarse.len() - 1).unwrap() }
+        );
         assert_eq!(pyramid.coarse_bytes(), 8 * (3 * 2 + 1));
     }
 }

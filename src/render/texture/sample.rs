@@ -1,9 +1,8 @@
-use glam::Vec4;
-
-use super::{Pyramid, pyramid::LevelView};
+use super::{Pyramid, pyramid::Level};
 use crate::{
-    render::wide::{Bits, Floats, LANES, Row, V2, log2, row},
+    render::wide::{Bits, Floats, LANES, V2, log2, row},
     scene::{Filter, TexSampler, Wrap},
+    simd::{Simd, Task},
 };
 
 /// Most taps along the longer axis of a footprint.
@@ -21,6 +20,13 @@ pub(crate) struct Footprint<F> {
 pub(crate) struct Source<'a> {
     pub(crate) pyramid: &'a Pyramid,
     pub(crate) sampler: TexSampler,
+}
+
+impl PartialEq for Source<'_> {
+    #[inline(always)]
+    fn eq(&self, other: &Self) -> bool {
+        std::ptr::eq(self.pyramid, other.pyramid) && self.sampler == other.sampler
+    }
 }
 
 /// Where and how finely to read, a look-up a lane: level of detail and, for stretched footprints, taps along the longer axis.
@@ -67,187 +73,223 @@ fn scaled<F: Floats>(step: V2<F>, texels: V2<F>) -> V2<F> {
     V2 { x: step.x * texels.x, y: step.y * texels.y }
 }
 
-/// The levels that each lane reads: up to two, blended.
-struct Levels<'a> {
-    views: [[Option<LevelView<'a>>; LANES]; 2],
-    /// Width and height of each.
-    sizes: [[Row; 2]; 2],
+/// What each lane reads of one texture: up to two levels, blended.
+struct Levels<F> {
+    near: Chosen<F>,
+    far: Chosen<F>,
     /// Weight of the second.
-    part: Row,
+    part: F,
     /// Lanes that read two.
     blended: u32,
     /// Lanes that read single texels.
     nearest: u32,
 }
 
-impl<'a> Levels<'a> {
+impl<F: Floats> Levels<F> {
     #[cfg_attr(not(debug_assertions), inline(always))]
-    fn new(mask: u32, sources: &[Option<Source<'a>>; LANES], lod: &Row) -> Self {
-        let mut out = Self {
-            views: [[None; LANES]; 2],
-            sizes: [[[1.0; LANES]; 2]; 2],
-            part: [0.0; LANES],
-            blended: 0,
-            nearest: 0,
+    fn new(Source { pyramid, sampler }: &Source<'_>, mask: u32, lod: F) -> Self {
+        let (zero, one) = (F::splat(0.0), F::splat(1.0));
+        let last = pyramid.level_count() - 1;
+        let smaller = mask & zero.lt(lod);
+        let lod = F::select(smaller, lod.min(F::splat(last as f32)), zero);
+        let level = match sampler.mip {
+            None => zero,
+            Some(Filter::Nearest) => (lod + F::splat(0.5)).floor().min(F::splat(last as f32)),
+            Some(Filter::Linear) => lod.floor(),
         };
-        for lane in Bits(mask) {
-            let Some(Source { pyramid, sampler }) = sources[lane] else { continue };
-            let last = pyramid.level_count() - 1;
-            let (filter, mip) = if lod[lane] > 0.0 { (sampler.min, sampler.mip) } else { (sampler.mag, None) };
-            let lod = lod[lane].min(last as f32);
-            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "between 0 and the last level")]
-            let (level, part) = match mip {
-                None => (0, 0.0),
-                Some(Filter::Nearest) => (((lod + 0.5) as usize).min(last), 0.0),
-                Some(Filter::Linear) => (lod as usize, lod - (lod as usize) as f32),
-            };
-            out.put(0, lane, pyramid.view(level));
-            // A single texel is what it is, not a blend of itself.
-            let single = last == 0 && pyramid.level(0).width == 1 && pyramid.level(0).height == 1;
-            out.nearest |= u32::from(single || filter == Filter::Nearest) << lane;
-            if part > 0.0 {
-                out.put(1, lane, pyramid.view((level + 1).min(last)));
-                out.part[lane] = part;
-                out.blended |= 1 << lane;
-            }
+        let (mut part, mut blended) = (zero, 0);
+        if sampler.mip == Some(Filter::Linear) {
+            part = lod - level;
+            blended = smaller & zero.lt(part);
         }
-        out
-    }
-
-    #[inline(always)]
-    fn put(&mut self, slot: usize, lane: usize, view: LevelView<'a>) {
-        self.sizes[slot][0][lane] = view.width as f32;
-        self.sizes[slot][1][lane] = view.height as f32;
-        self.views[slot][lane] = Some(view);
+        let finest = pyramid.level(0);
+        // A single texel is what it is, not a blend of itself.
+        let single = last == 0 && finest.width == 1 && finest.height == 1;
+        let mut nearest = if single || sampler.min == Filter::Nearest { smaller } else { 0 };
+        if single || sampler.mag == Filter::Nearest {
+            nearest |= !smaller & F::ALL;
+        }
+        let near = Chosen::new(pyramid, mask, level);
+        let far = if blended == 0 { near } else { Chosen::new(pyramid, blended, level + one) };
+        Self { near, far, part, blended, nearest }
     }
 }
 
-/// The four texels around a point of a level, and the weights of the right and the lower ones; a look-up a lane.
+/// A level of a texture, a lane.
 #[derive(Clone, Copy)]
-struct Cells {
-    /// Columns left and right, rows above and below.
-    columns: [[u32; LANES]; 2],
-    rows: [[u32; LANES]; 2],
-    right: Row,
-    lower: Row,
+struct Chosen<F> {
+    width: F,
+    height: F,
+    stride: [u32; LANES],
+    /// Its first texel among those of the coarser levels.
+    first: [u32; LANES],
+    /// Lanes that read the finest level.
+    finest: u32,
 }
 
-impl Cells {
-    const NONE: Self =
-        Self { columns: [[0; LANES]; 2], rows: [[0; LANES]; 2], right: [0.0; LANES], lower: [0.0; LANES] };
-
-    /// Around the folded coordinates `u` and `v`.
+impl<F: Floats> Chosen<F> {
+    /// The levels of whole numbers that the lanes of `mask` name, at most the last; others name any.
     #[cfg_attr(not(debug_assertions), inline(always))]
-    fn fill<F: Floats>(&mut self, u: F, v: F, size: &[Row; 2], wraps: &Wraps, nearest: u32) {
-        let (width, height) = (F::load(&size[0]), F::load(&size[1]));
-        let (columns, right) = pair(u * width, width, wraps.repeat_u, nearest);
-        let (rows, lower) = pair(v * height, height, wraps.repeat_v, nearest);
-        (self.columns, self.right) = ([whole(columns[0]), whole(columns[1])], row(right));
-        (self.rows, self.lower) = ([whole(rows[0]), whole(rows[1])], row(lower));
-    }
-
-    /// The blend of a lane's four texels.
-    #[cfg_attr(not(debug_assertions), inline(always))]
-    fn blend(&self, lane: usize, view: &LevelView<'_>) -> Vec4 {
-        let [left, right] = [self.columns[0][lane], self.columns[1][lane]];
-        let [a, b, c, d] = view.four([left, right], [self.rows[0][lane], self.rows[1][lane]]);
-        let (fx, fy) = (self.right[lane], self.lower[lane]);
-        let top = a * (1.0 - fx) + b * fx;
-        let bottom = c * (1.0 - fx) + d * fx;
-        top * (1.0 - fy) + bottom * fy
-    }
-}
-
-/// Lanes by wrap mode.
-struct Wraps {
-    repeat_u: u32,
-    repeat_v: u32,
-    mirror_u: u32,
-    mirror_v: u32,
-}
-
-impl Wraps {
-    #[cfg_attr(not(debug_assertions), inline(always))]
-    fn new(mask: u32, sources: &[Option<Source<'_>>; LANES]) -> Self {
-        let mut out = Self { repeat_u: 0, repeat_v: 0, mirror_u: 0, mirror_v: 0 };
+    fn new(pyramid: &Pyramid, mask: u32, level: F) -> Self {
+        let last = pyramid.level_count() - 1;
+        let numbers = whole(level);
+        let lead = numbers[mask.trailing_zeros() as usize % LANES];
+        let one = F::splat(lead as f32);
+        let finest = level.le(F::splat(0.0));
+        if mask & !(level.le(one) & one.le(level)) == 0 {
+            let Level { width, height, first } = pyramid.level(last.min(lead as usize));
+            return Self {
+                width: F::splat(width as f32),
+                height: F::splat(height as f32),
+                stride: [width; LANES],
+                first: [first; LANES],
+                finest: finest | !mask,
+            };
+        }
+        let (mut sizes, mut stride, mut starts) = ([[1.0; LANES]; 2], [1; LANES], [0; LANES]);
         for lane in Bits(mask) {
-            if let Some(Source { sampler, .. }) = sources[lane] {
-                out.repeat_u |= u32::from(sampler.wrap_u == Wrap::Repeat) << lane;
-                out.repeat_v |= u32::from(sampler.wrap_v == Wrap::Repeat) << lane;
-                out.mirror_u |= u32::from(sampler.wrap_u == Wrap::Mirror) << lane;
-                out.mirror_v |= u32::from(sampler.wrap_v == Wrap::Mirror) << lane;
-            }
+            let Level { width, height, first } = pyramid.level(last.min(numbers[lane] as usize));
+            (sizes[0][lane], sizes[1][lane]) = (width as f32, height as f32);
+            (stride[lane], starts[lane]) = (width, first);
+        }
+        Self { width: F::load(&sizes[0]), height: F::load(&sizes[1]), stride, first: starts, finest }
+    }
+
+    /// The blend of the four texels around the folded coordinates `u` and `v`, for the lanes of `mask`.
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    fn read(&self, Source { pyramid, sampler }: &Source<'_>, mask: u32, [u, v]: [F; 2], nearest: u32) -> [F; 4] {
+        let repeat = |wrap: Wrap| if wrap == Wrap::Repeat { F::ALL } else { 0 };
+        let (columns, right) = pair(u * self.width, self.width, repeat(sampler.wrap_u), nearest);
+        let (rows, lower) = pair(v * self.height, self.height, repeat(sampler.wrap_v), nearest);
+        let (columns, rows) = ([whole(columns[0]), whole(columns[1])], [whole(rows[0]), whole(rows[1])]);
+        let (left, upper) = (F::splat(1.0) - right, F::splat(1.0) - lower);
+        let a = self.texels(pyramid, mask, &rows[0], &columns[0]);
+        let b = self.texels(pyramid, mask, &rows[0], &columns[1]);
+        let c = self.texels(pyramid, mask, &rows[1], &columns[0]);
+        let d = self.texels(pyramid, mask, &rows[1], &columns[1]);
+        let mut out = a;
+        for i in 0..4 {
+            let top = a[i] * left + b[i] * right;
+            let bottom = c[i] * left + d[i] * right;
+            out[i] = top * upper + bottom * lower;
         }
         out
+    }
+}
+
+impl<F: Floats> Chosen<F> {
+    /// The texels of the lanes of `mask` in these rows and columns.
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    fn texels(&self, pyramid: &Pyramid, mask: u32, rows: &[u32; LANES], columns: &[u32; LANES]) -> [F; 4] {
+        let mut places = [0; LANES];
+        for lane in 0..F::LEN {
+            // Numbers past 2^24 are not exact in f32.
+            let row = rows[lane].wrapping_mul(self.stride[lane]);
+            places[lane] = row.wrapping_add(columns[lane]).wrapping_add(self.first[lane]);
+        }
+        pyramid.texels::<F>(&places, mask, self.finest)
     }
 }
 
 /// The textures' linear RGBA at `uv` (v down), filtered over `footprint` as their samplers say; 0 in lanes without one.
-/// Any float is taken.
+/// Any float is taken. Lanes that read one texture in one way are read together.
 #[cfg_attr(not(debug_assertions), inline(always))]
 pub(crate) fn sample<F: Floats>(sources: &[Option<Source<'_>>; LANES], uv: V2<F>, footprint: &Footprint<F>) -> [F; 4] {
-    let (mut mask, mut layered) = (0, 0);
-    let mut texels = [[1.0; LANES]; 2];
-    for (lane, source) in sources.iter().enumerate() {
-        if let Some(Source { pyramid, .. }) = source {
-            let size = pyramid.level(0);
-            (texels[0][lane], texels[1][lane]) = (size.width as f32, size.height as f32);
-            layered |= u32::from(pyramid.level_count() > 1) << lane;
-            mask |= 1 << lane;
+    let mut out = [F::splat(0.0); 4];
+    let mut left = F::ALL;
+    while left != 0 {
+        let lead = &sources[left.trailing_zeros() as usize % LANES];
+        let mut same = 0;
+        for (lane, source) in sources.iter().enumerate() {
+            same |= u32::from(source == lead) << lane;
+        }
+        same &= left;
+        left &= !same;
+        if let Some(source) = lead {
+            let texels = sample_one(source, same, uv, footprint);
+            for i in 0..4 {
+                out[i] = F::select(same, texels[i], out[i]);
+            }
         }
     }
-    let plan = Plan::new(V2::<F>::load(&texels), layered, footprint);
-    let levels = Levels::new(mask, sources, &row(plan.lod));
-    let wraps = Wraps::new(mask, sources);
-    let taps = row(plan.taps);
-    let mut cells = [[Cells::NONE; 2]; MAX_TAPS];
-    let first = F::splat(-0.5) * (plan.taps - F::splat(1.0));
-    for (tap, cells) in cells.iter_mut().enumerate() {
-        if tap > 0 && F::splat(tap as f32).lt(plan.taps) & mask == 0 {
+    out
+}
+
+/// [`sample`] of one texture for the lanes of `mask`, at least one; anything in others.
+#[inline(always)]
+pub(crate) fn sample_one<F: Floats>(source: &Source<'_>, mask: u32, uv: V2<F>, footprint: &Footprint<F>) -> [F; 4] {
+    F::Level::call(SampleOne { source, mask, uv, footprint })
+}
+
+/// [`sample_one`] as a function of its own: it is long, and asked for in many places.
+struct SampleOne<'a, F> {
+    source: &'a Source<'a>,
+    mask: u32,
+    uv: V2<F>,
+    footprint: &'a Footprint<F>,
+}
+
+impl<F: Floats> Task for SampleOne<'_, F> {
+    type Output = [F; 4];
+
+    #[inline(always)]
+    fn run<S: Simd>(self) -> [F; 4] {
+        look_up(self.source, self.mask, self.uv, self.footprint)
+    }
+}
+
+#[cfg_attr(not(debug_assertions), inline(always))]
+fn look_up<F: Floats>(source: &Source<'_>, mask: u32, uv: V2<F>, footprint: &Footprint<F>) -> [F; 4] {
+    let Source { pyramid, sampler } = source;
+    let (zero, one) = (F::splat(0.0), F::splat(1.0));
+    let size = pyramid.level(0);
+    let layered = if pyramid.level_count() > 1 { F::ALL } else { 0 };
+    let texels = V2 { x: F::splat(size.width as f32), y: F::splat(size.height as f32) };
+    let plan = Plan::new(texels, layered, footprint);
+    let levels = Levels::new(source, mask, plan.lod);
+    let first = F::splat(-0.5) * (plan.taps - one);
+    let mut sum = [zero; 4];
+    for tap in 0..MAX_TAPS {
+        let tap = F::splat(tap as f32);
+        let open = mask & tap.lt(plan.taps);
+        if open == 0 {
             break;
         }
-        let at = uv + plan.step * (first + F::splat(tap as f32));
-        let u = fold(at.x, wraps.repeat_u, wraps.mirror_u);
-        let v = fold(at.y, wraps.repeat_v, wraps.mirror_v);
-        cells[0].fill(u, v, &levels.sizes[0], &wraps, levels.nearest);
-        if levels.blended != 0 {
-            cells[1].fill(u, v, &levels.sizes[1], &wraps, levels.nearest);
+        let at = uv + plan.step * (first + tap);
+        let place = [fold(at.x, sampler.wrap_u), fold(at.y, sampler.wrap_v)];
+        let mut texel = levels.near.read(source, open, place, levels.nearest);
+        let blended = levels.blended & open;
+        if blended != 0 {
+            let far = levels.far.read(source, blended, place, levels.nearest);
+            for i in 0..4 {
+                texel[i] = F::select(blended, texel[i] + (far[i] - texel[i]) * levels.part, texel[i]);
+            }
+        }
+        for i in 0..4 {
+            sum[i] = F::select(open, sum[i] + texel[i], sum[i]);
         }
     }
-    let mut out = [[0.0; LANES]; 4];
-    for lane in Bits(mask) {
-        let Some(fine) = &levels.views[0][lane] else { continue };
-        let count = taps[lane];
-        let mut sum = Vec4::ZERO;
-        for (tap, [near, far]) in cells.iter().enumerate() {
-            if tap as f32 >= count {
-                break;
-            }
-            let mut texel = near.blend(lane, fine);
-            if let Some(coarse) = &levels.views[1][lane] {
-                texel += (far.blend(lane, coarse) - texel) * levels.part[lane];
-            }
-            sum += texel;
-        }
-        if count > 1.0 {
-            sum /= count;
-        }
-        for (row, channel) in out.iter_mut().zip(sum.to_array()) {
-            row[lane] = channel;
+    let several = mask & one.lt(plan.taps);
+    if several != 0 {
+        for sum in &mut sum {
+            *sum = F::select(several, *sum / plan.taps, *sum);
         }
     }
-    [F::load(&out[0]), F::load(&out[1]), F::load(&out[2]), F::load(&out[3])]
+    sum
 }
 
 /// Coordinates brought into [0, 1] as the wrap modes say; 0 for NaN and infinities.
 #[cfg_attr(not(debug_assertions), inline(always))]
-fn fold<F: Floats>(x: F, repeat: u32, mirror: u32) -> F {
+fn fold<F: Floats>(x: F, wrap: Wrap) -> F {
     let (zero, one, two) = (F::splat(0.0), F::splat(1.0), F::splat(2.0));
-    let mut folded = F::select(repeat, x - x.floor(), x);
-    if mirror != 0 {
-        let pair = x - two * (x * F::splat(0.5)).floor();
-        folded = F::select(mirror, F::select(one.lt(pair), two - pair, pair), folded);
-    }
+    let folded = match wrap {
+        Wrap::Clamp => x,
+        Wrap::Repeat => x - x.floor(),
+        Wrap::Mirror => {
+            let pair = x - two * (x * F::splat(0.5)).floor();
+            F::select(one.lt(pair), two - pair, pair)
+        }
+    };
     F::select(zero.le(folded), folded.min(one), zero)
 }
 
@@ -285,13 +327,13 @@ fn whole<F: Floats>(x: F) -> [u32; LANES] {
 
 #[cfg(test)]
 mod tests {
-    use glam::Vec2;
+    use glam::{Vec2, Vec4};
 
     use super::{super::pyramid::tests::image, *};
     use crate::{
         render::{
             texture::Encoding,
-            wide::{One, only},
+            wide::{One, Row, only},
         },
         simd::{Lanes, Simd, SimdLevel, Task, dispatch},
     };

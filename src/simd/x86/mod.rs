@@ -14,6 +14,7 @@ mod avx2;
 mod avx512;
 mod columns;
 mod corners;
+mod texels;
 mod vectors;
 mod words;
 
