@@ -11,7 +11,8 @@ use super::{
     context::FrameContext,
     filter::{Layer, Layers, is_seen},
     found::{Maps, Spots},
-    pattern::{PixelSampler, subpixel},
+    material::Coverage,
+    pattern::{Samplers, subpixel},
     plain::{self, PlainPoints},
     probe::{NO_RAY, Points, Probes},
     shade::LitPoints,
@@ -19,6 +20,7 @@ use super::{
     wide::{Bits, Floats, LANES, V3, row},
 };
 use crate::{
+    accel::LanePacket,
     geom::{Hit, Ray},
     simd::{Lanes, Simd},
 };
@@ -59,7 +61,7 @@ pub(crate) struct Block<F> {
 struct CameraRays<F> {
     rays: [Ray; LANES],
     dir: V3<F>,
-    random: [PixelSampler; LANES],
+    random: Samplers,
 }
 
 impl<F: Floats> Block<F> {
@@ -94,37 +96,40 @@ impl<F: Floats> Block<F> {
 
     /// Adds one sample of every pixel.
     #[cfg_attr(not(debug_assertions), inline(always))]
-    pub(crate) fn add_sample<S: Simd<F = F>>(&mut self, ctx: &FrameContext<'_>, sample: u32) {
+    pub(crate) fn add_sample<S: Simd<F = F>>(&mut self, ctx: &FrameContext<'_>, packet: &mut LanePacket, sample: u32) {
         let camera = self.camera_rays(ctx, sample);
-        let mut nearest = [None; LANES];
-        ctx.world.nearest_hits::<S>(&camera.rays[..F::LEN], &mut nearest);
-        let mut through = F::splat(1.0);
-        let mut last = [None; LANES];
-        let mut active = self.mask;
-        for layer in 0..LAYERS {
-            self.rays += u64::from(active.count_ones());
-            let mut seen = [None; LANES];
-            for lane in Bits(active) {
-                let ray = &camera.rays[lane];
-                seen[lane] = match nearest[lane] {
-                    None if layer == 0 => None,
-                    Some(hit) if layer == 0 && is_seen(ctx, ray, None, &hit) => Some(hit),
-                    _ => next_seen::<S>(ctx, ray, last[lane].as_ref()),
-                };
+        let mut seen = [None; LANES];
+        ctx.world.nearest_hits_with::<S>(packet, &camera.rays[..F::LEN], &mut seen);
+        self.rays += u64::from(self.mask.count_ones());
+        let mut spots = Spots::new(ctx, &seen);
+        let passed = unseen(ctx, &spots, &camera, &seen);
+        if passed != 0 {
+            for lane in Bits(passed) {
+                seen[lane] = next_seen::<S>(ctx, &camera.rays[lane], None);
             }
-            let spots = Spots::new(ctx, &seen);
+            spots = Spots::new(ctx, &seen);
+        }
+        self.meet(spots.mask, &seen);
+        let mut through = F::splat(1.0);
+        for _ in 1..LAYERS {
             if spots.mask == 0 {
                 return;
             }
-            if layer == 0 {
-                self.meet(spots.mask, &seen);
-            }
-            through = self.shade::<S>(ctx, &spots, &camera, through);
-            active = spots.mask & F::splat(OPAQUE).le(through);
+            through = self.shade::<S>(ctx, packet, &spots, &camera, through);
+            let active = spots.mask & F::splat(OPAQUE).le(through);
             if active == 0 {
                 return;
             }
-            last = seen;
+            self.rays += u64::from(active.count_ones());
+            let mut next = [None; LANES];
+            for lane in Bits(active) {
+                next[lane] = next_seen::<S>(ctx, &camera.rays[lane], seen[lane].as_ref());
+            }
+            seen = next;
+            spots = Spots::new(ctx, &seen);
+        }
+        if spots.mask != 0 {
+            self.shade::<S>(ctx, packet, &spots, &camera, through);
         }
     }
 
@@ -132,13 +137,18 @@ impl<F: Floats> Block<F> {
     fn camera_rays(&self, ctx: &FrameContext<'_>, sample: u32) -> CameraRays<F> {
         let (jitter_x, jitter_y) = subpixel(sample);
         let (mut x, mut y) = ([0.0; LANES], [0.0; LANES]);
-        let settings = &ctx.settings;
-        let mut random = [PixelSampler::new(0, 0, 0, sample); LANES];
         for lane in 0..F::LEN {
             let (column, row) = self.pixel(lane);
             (x[lane], y[lane]) = (column as f32 + jitter_x, row as f32 + jitter_y);
-            random[lane] = PixelSampler::new(settings.seed, settings.frame, row * ctx.size[0] + column, sample);
         }
+        let random = Samplers {
+            seed: ctx.settings.seed,
+            frame: ctx.settings.frame,
+            first: self.top * ctx.size[0] + self.left,
+            stride: ctx.size[0],
+            columns: COLUMNS,
+            sample,
+        };
         let [origin, dir] = ctx.rays.lines(F::load(&x), F::load(&y));
         let ([ox, oy, oz], [dx, dy, dz]) = (origin.rows(), dir.rows());
         let [t_near, t_far] = ctx.rays.range();
@@ -159,6 +169,7 @@ impl<F: Floats> Block<F> {
     fn shade<'a, S: Simd<F = F>>(
         &mut self,
         ctx: &FrameContext<'a>,
+        packet: &mut LanePacket,
         spots: &Spots<'a>,
         camera: &CameraRays<F>,
         through: F,
@@ -171,10 +182,10 @@ impl<F: Floats> Block<F> {
         let surface = Surface::new(ctx, spots, &patch, &mut maps, camera.dir);
         if ctx.settings.shading.is_lit() {
             let points = LitPoints::new(ctx, spots, &patch, maps, &surface);
-            self.light::<S, _>(ctx, spots.mask, points, camera, through)
+            self.light::<S, _>(ctx, packet, spots.mask, points, camera, through)
         } else {
             let points = PlainPoints::new(ctx, spots, &surface);
-            self.light::<S, _>(ctx, spots.mask, points, camera, through)
+            self.light::<S, _>(ctx, packet, spots.mask, points, camera, through)
         }
     }
 
@@ -184,6 +195,7 @@ impl<F: Floats> Block<F> {
     fn light<S: Simd<F = F>, P: Points<F>>(
         &mut self,
         ctx: &FrameContext<'_>,
+        packet: &mut LanePacket,
         mask: u32,
         mut points: P,
         camera: &CameraRays<F>,
@@ -193,7 +205,7 @@ impl<F: Floats> Block<F> {
             let probes = points.probes(ctx, number, &camera.random);
             if probes.mask != 0 {
                 self.rays += u64::from(probes.mask.count_ones());
-                let arriving = transmittances::<S>(ctx, &probes);
+                let arriving = transmittances::<S>(ctx, packet, &probes);
                 points.add(probes.mask, probes.light * arriving);
             }
         }
@@ -222,6 +234,30 @@ fn probe_count(ctx: &FrameContext<'_>) -> usize {
     if ctx.settings.shading.is_lit() { ctx.lights.len() } else { plain::probe_count(ctx.settings.shading) }
 }
 
+/// The lanes whose nearest hit does not count, as [`is_seen`] says of each.
+#[cfg_attr(not(debug_assertions), inline(always))]
+fn unseen<'a, F: Floats>(
+    ctx: &FrameContext<'a>,
+    spots: &Spots<'a>,
+    camera: &CameraRays<F>,
+    hits: &[Option<Hit>; LANES],
+) -> u32 {
+    let sides = spots.lanes(|spot| !spot.material.double_sided);
+    let mut passed = 0;
+    if sides != 0 {
+        let away = F::splat(0.0).lt(spots.cross().dot(camera.dir));
+        passed = sides & (away ^ spots.lanes(|spot| spot.info.mirrored));
+    }
+    if ctx.pierced {
+        for lane in Bits(spots.lanes(|spot| spot.material.coverage != Coverage::Opaque) & !passed) {
+            if hits[lane].is_some_and(|hit| !is_seen(ctx, &camera.rays[lane], None, &hit)) {
+                passed |= 1 << lane;
+            }
+        }
+    }
+    passed
+}
+
 /// The next thing that a camera ray sees where the nearest hit does not count: a culled face, a hole, a layer already met.
 ///
 /// The range is closed and layers up to the last are refused, so none is lost and none is met twice.
@@ -237,10 +273,10 @@ fn next_seen<S: Simd>(ctx: &FrameContext<'_>, ray: &Ray, last: Option<&Hit>) -> 
 /// Blended layers dim it in order of (t, instance, prim), so that the product does not depend on the order in which a
 /// structure finds them.
 #[cfg_attr(not(debug_assertions), inline(always))]
-fn transmittances<S: Simd>(ctx: &FrameContext<'_>, probes: &Probes<S::F>) -> S::F {
+fn transmittances<S: Simd>(ctx: &FrameContext<'_>, packet: &mut LanePacket, probes: &Probes<S::F>) -> S::F {
     let rays = probes.rays();
     if !ctx.pierced {
-        let blocked = ctx.world.blocked::<S>(&rays[..S::F::LEN]);
+        let blocked = ctx.world.blocked_with::<S>(packet, &rays[..S::F::LEN]);
         return S::F::select(blocked, S::F::splat(0.0), S::F::splat(1.0));
     }
     let widths = row(probes.width);

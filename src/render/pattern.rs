@@ -56,12 +56,6 @@ impl PixelSampler {
         Self { key: scene ^ (u64::from(pixel) << 20), sample }
     }
 
-    /// Number of the sample in the pixel's pattern.
-    #[inline(always)]
-    pub(crate) fn index(&self) -> u32 {
-        self.sample
-    }
-
     /// Point `index` of `count` on the unit square for `purpose`; the samples of a pixel together continue one
     /// evenly spread sequence.
     #[inline(always)]
@@ -69,6 +63,30 @@ impl PixelSampler {
         let key = self.key ^ (u64::from(purpose) << 56);
         let start = [hash(key), hash(key ^ 0x5555_0000_0000)];
         r2(self.sample.wrapping_mul(count).wrapping_add(index), start)
+    }
+}
+
+/// The samplers of a block of pixels, made where one is asked for.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Samplers {
+    pub(crate) seed: u64,
+    pub(crate) frame: u64,
+    /// Number of the block's first pixel, of pixels in a row of the picture, and of those in a row of the block.
+    pub(crate) first: u32,
+    pub(crate) stride: u32,
+    pub(crate) columns: u32,
+    /// Number of the sample in each pixel's pattern.
+    pub(crate) sample: u32,
+}
+
+impl Samplers {
+    /// That of a pixel of the block, row by row.
+    #[inline(always)]
+    pub(crate) fn at(&self, lane: usize) -> PixelSampler {
+        #[expect(clippy::cast_possible_truncation, reason = "at most 16")]
+        let lane = lane as u32;
+        let pixel = self.first.wrapping_add(lane / self.columns * self.stride + lane % self.columns);
+        PixelSampler::new(self.seed, self.frame, pixel, self.sample)
     }
 }
 

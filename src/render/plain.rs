@@ -7,7 +7,7 @@ use super::{
     context::FrameContext,
     found::Spots,
     math::{disc, frame},
-    pattern::PixelSampler,
+    pattern::Samplers,
     probe::{Points, Probes},
     surface::Surface,
     wide::{Bits, Floats, LANES, V3, clamp, put3, row},
@@ -64,14 +64,14 @@ impl<'s, F: Floats> PlainPoints<'s, F> {
 impl<F: Floats> Points<F> for PlainPoints<'_, F> {
     /// Occlusion rays `number`, drawn from the cosine-weighted hemisphere within the context's reach.
     #[cfg_attr(not(debug_assertions), inline(always))]
-    fn probes(&self, ctx: &FrameContext<'_>, number: usize, random: &[PixelSampler; LANES]) -> Probes<F> {
+    fn probes(&self, ctx: &FrameContext<'_>, number: usize, random: &Samplers) -> Probes<F> {
         let normals = self.surface.n_shade.rows();
         let mut rows = [[0.0; LANES]; 3];
         for lane in Bits(self.mask) {
             let n = Vec3::new(normals[0][lane], normals[1][lane], normals[2][lane]);
             let (a, b) = frame(n);
             #[expect(clippy::cast_possible_truncation, reason = "a handful of rays")]
-            let (u, v) = random[lane].square(AO_PATTERN, number as u32, AO_RAYS);
+            let (u, v) = random.at(lane).square(AO_PATTERN, number as u32, AO_RAYS);
             let (x, y) = disc(u, v);
             put3(&mut rows, lane, a * x + b * y + n * (1.0 - x * x - y * y).max(0.0).sqrt());
         }

@@ -4,7 +4,7 @@ use glam::Vec3;
 
 use super::{
     context::FrameContext,
-    pattern::PixelSampler,
+    pattern::Samplers,
     wide::{Floats, LANES, V3, row},
 };
 use crate::geom::Ray;
@@ -25,7 +25,7 @@ pub(crate) struct Probes<F> {
 /// Points of a block to be lit, a lane each.
 pub(crate) trait Points<F> {
     /// Their secondary rays of number `number`; `random` decides which of many.
-    fn probes(&self, ctx: &FrameContext<'_>, number: usize, random: &[PixelSampler; LANES]) -> Probes<F>;
+    fn probes(&self, ctx: &FrameContext<'_>, number: usize, random: &Samplers) -> Probes<F>;
     /// Adds light in the lanes of `mask`.
     fn add(&mut self, mask: u32, light: V3<F>);
     /// Colour towards the viewer and the part of the light behind that is stopped.

@@ -10,7 +10,7 @@ use super::{
     material::{Channel, Coverage},
     math::disc,
     patch::Patch,
-    pattern::PixelSampler,
+    pattern::Samplers,
     probe::{Points, Probes},
     surface::Surface,
     tone::filmic_inverse,
@@ -86,15 +86,15 @@ impl<'s, F: Floats> LitPoints<'s, F> {
 impl<F: Floats> Points<F> for LitPoints<'_, F> {
     /// The rays to light `number` with the light that they may bring.
     #[cfg_attr(not(debug_assertions), inline(always))]
-    fn probes(&self, ctx: &FrameContext<'_>, number: usize, random: &[PixelSampler; LANES]) -> Probes<F> {
+    fn probes(&self, ctx: &FrameContext<'_>, number: usize, random: &Samplers) -> Probes<F> {
         let light = &ctx.lights[number];
         // The first sample sees the light's centre, so that one sample a pixel gives clean edges.
         let mut spots = None;
-        if light.has_size() && random[0].index() > 0 {
+        if light.has_size() && random.sample > 0 {
             let mut rows = [[0.0; LANES]; 2];
             for lane in Bits(self.lit) {
                 #[expect(clippy::cast_possible_truncation, reason = "a handful of lights")]
-                let (u, v) = random[lane].square(LIGHT_PATTERN + number as u32, 0, 1);
+                let (u, v) = random.at(lane).square(LIGHT_PATTERN + number as u32, 0, 1);
                 put2(&mut rows, lane, disc(u, v).into());
             }
             spots = Some(rows);

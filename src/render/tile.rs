@@ -11,7 +11,10 @@ use super::{
     tone::filmic_of,
     wide::{Bits, Floats, LANES, V3, put3, row},
 };
-use crate::simd::{Simd, Task};
+use crate::{
+    accel::LanePacket,
+    simd::{Simd, Task},
+};
 
 /// Rows of a band.
 pub(crate) const BAND_ROWS: usize = 8;
@@ -51,6 +54,7 @@ impl Task for BandTask<'_, '_> {
             self.clear(y, 0..left, color);
             self.clear(y, right..width, color);
         }
+        let mut packet = LanePacket::EMPTY;
         let mut rays = 0;
         let mut y = self.band.top;
         while y < bottom {
@@ -59,7 +63,7 @@ impl Task for BandTask<'_, '_> {
             while x < x1 && !rows.is_empty() {
                 let mut block = Block::<S::F>::new(x, y, &(x.max(x0)..(x + COLUMNS).min(x1)), &rows);
                 for sample in 0..ctx.settings.samples {
-                    block.add_sample::<S>(ctx, ctx.settings.first_sample.wrapping_add(sample));
+                    block.add_sample::<S>(ctx, &mut packet, ctx.settings.first_sample.wrapping_add(sample));
                 }
                 self.store(&block, &behind);
                 rays += block.rays;

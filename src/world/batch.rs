@@ -2,7 +2,7 @@
 
 use super::World;
 use crate::{
-    accel::PACKET,
+    accel::{LanePacket, PACKET},
     geom::{Hit, Ray},
     simd::{FloatModeError, Simd, SimdLevel, Task, check_float_mode, dispatch},
 };
@@ -48,8 +48,9 @@ impl Task for HitAll<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self) {
+        let mut lanes = LanePacket::EMPTY;
         for (rays, hits) in self.rays.chunks(PACKET).zip(self.out.chunks_mut(PACKET)) {
-            self.world.nearest_hits::<S>(rays, hits);
+            self.world.nearest_hits_with::<S>(&mut lanes, rays, hits);
         }
     }
 }
@@ -65,8 +66,9 @@ impl Task for BlockAll<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self) {
+        let mut lanes = LanePacket::EMPTY;
         for (rays, out) in self.rays.chunks(PACKET).zip(self.out.chunks_mut(PACKET)) {
-            let blocked = self.world.blocked::<S>(rays);
+            let blocked = self.world.blocked_with::<S>(&mut lanes, rays);
             for (i, out) in out.iter_mut().enumerate() {
                 *out = (blocked >> i) & 1 == 1;
             }

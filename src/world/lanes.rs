@@ -104,6 +104,7 @@ impl<S: Simd> ManyVisit<S> for AnyLanes<'_> {
 /// [`World::nearest_by_lane`], called so that what it needs of the stack is not a part of what every query needs.
 struct Nearest<'a> {
     world: &'a World,
+    packet: &'a mut LanePacket,
     rays: &'a [Ray],
     hits: &'a mut [Option<Hit>],
 }
@@ -113,13 +114,14 @@ impl Task for Nearest<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self) -> bool {
-        self.world.nearest_in_lanes::<S>(self.rays, self.hits)
+        self.world.nearest_in_lanes::<S>(self.packet, self.rays, self.hits)
     }
 }
 
 /// [`World::blocked_by_lane`], called as [`Nearest`] is.
 struct Blocked<'a> {
     world: &'a World,
+    packet: &'a mut LanePacket,
     rays: &'a [Ray],
 }
 
@@ -128,20 +130,24 @@ impl Task for Blocked<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self) -> Option<u32> {
-        self.world.blocked_in_lanes::<S>(self.rays)
+        self.world.blocked_in_lanes::<S>(self.packet, self.rays)
     }
 }
 
 impl World {
     /// False when nothing was answered, since the rays point apart.
     #[inline(always)]
-    pub(super) fn nearest_by_lane<S: Simd>(&self, rays: &[Ray], hits: &mut [Option<Hit>]) -> bool {
-        S::call(Nearest { world: self, rays, hits })
+    pub(super) fn nearest_by_lane<S: Simd>(
+        &self,
+        packet: &mut LanePacket,
+        rays: &[Ray],
+        hits: &mut [Option<Hit>],
+    ) -> bool {
+        S::call(Nearest { world: self, packet, rays, hits })
     }
 
     #[inline(always)]
-    fn nearest_in_lanes<S: Simd>(&self, rays: &[Ray], hits: &mut [Option<Hit>]) -> bool {
-        let mut packet = LanePacket::EMPTY;
+    fn nearest_in_lanes<S: Simd>(&self, packet: &mut LanePacket, rays: &[Ray], hits: &mut [Option<Hit>]) -> bool {
         for first in (0..rays.len()).step_by(S::F::LEN) {
             let end = rays.len().min(first + S::F::LEN);
             let (rays, hits) = (&rays[first..end], &mut hits[first..end]);
@@ -149,7 +155,7 @@ impl World {
             if first == 0 && packet.points_apart::<S>(taken) {
                 return false;
             }
-            let alone = !taken | self.offer_groups::<S>(rays, &mut packet, taken);
+            let alone = !taken | self.offer_groups::<S>(rays, packet, taken);
             packet.hits::<S, _>(&AnyHit, hits);
             for (i, ray) in rays.iter().enumerate() {
                 if (alone >> i) & 1 == 1 {
@@ -191,13 +197,12 @@ impl World {
 
     /// `None` when nothing was answered, since the rays point apart.
     #[inline(always)]
-    pub(super) fn blocked_by_lane<S: Simd>(&self, rays: &[Ray]) -> Option<u32> {
-        S::call(Blocked { world: self, rays })
+    pub(super) fn blocked_by_lane<S: Simd>(&self, packet: &mut LanePacket, rays: &[Ray]) -> Option<u32> {
+        S::call(Blocked { world: self, packet, rays })
     }
 
     #[inline(always)]
-    fn blocked_in_lanes<S: Simd>(&self, rays: &[Ray]) -> Option<u32> {
-        let mut packet = LanePacket::EMPTY;
+    fn blocked_in_lanes<S: Simd>(&self, packet: &mut LanePacket, rays: &[Ray]) -> Option<u32> {
         let mut blocked = 0;
         for first in (0..rays.len()).step_by(S::F::LEN) {
             let rays = &rays[first..rays.len().min(first + S::F::LEN)];
@@ -205,7 +210,7 @@ impl World {
             if first == 0 && packet.points_apart::<S>(taken) {
                 return None;
             }
-            let [stopped, alone] = self.ask_groups::<S>(&mut packet, taken);
+            let [stopped, alone] = self.ask_groups::<S>(packet, taken);
             blocked |= stopped << first;
             for (i, ray) in rays.iter().enumerate() {
                 if ((!taken | alone) >> i) & 1 == 1 && self.is_blocked::<S>(ray) {

@@ -7,7 +7,10 @@ use super::{
     top::FLAT,
 };
 use crate::{
-    accel::{Closest, EightPacket, LEAF, ManyVisit, PACKET, PacketBoxes, RigidPacket, TravRay, walk_many, walk_one},
+    accel::{
+        Closest, EightPacket, LEAF, LanePacket, ManyVisit, PACKET, PacketBoxes, RigidPacket, TravRay, walk_many,
+        walk_one,
+    },
     geom::{Forms, Hit, Ray},
     simd::{Lanes, Simd},
 };
@@ -65,9 +68,16 @@ impl World {
     /// When there are more than [`PACKET`] rays or fewer hits than rays.
     #[inline(always)]
     pub fn nearest_hits<S: Simd>(&self, rays: &[Ray], hits: &mut [Option<Hit>]) {
+        let mut lanes = LanePacket::EMPTY;
+        self.nearest_hits_with::<S>(&mut lanes, rays, hits);
+    }
+
+    /// [`World::nearest_hits`] for callers with many packets: `lanes` is overwritten where it is used, so nothing is cleared for each.
+    #[inline(always)]
+    pub(crate) fn nearest_hits_with<S: Simd>(&self, lanes: &mut LanePacket, rays: &[Ray], hits: &mut [Option<Hit>]) {
         assert!(rays.len() <= PACKET && rays.len() <= hits.len(), "at most {PACKET} rays, a hit for each");
         hits[rays.len()..].fill(None);
-        if self.top.takes_lanes() && self.nearest_by_lane::<S>(rays, hits) {
+        if self.top.takes_lanes() && self.nearest_by_lane::<S>(lanes, rays, hits) {
             return;
         }
         hits.fill(None);
@@ -102,9 +112,16 @@ impl World {
     /// When there are more than [`PACKET`] rays.
     #[inline(always)]
     pub fn blocked<S: Simd>(&self, rays: &[Ray]) -> u32 {
+        let mut lanes = LanePacket::EMPTY;
+        self.blocked_with::<S>(&mut lanes, rays)
+    }
+
+    /// [`World::blocked`] for callers with many packets, as [`World::nearest_hits_with`].
+    #[inline(always)]
+    pub(crate) fn blocked_with<S: Simd>(&self, lanes: &mut LanePacket, rays: &[Ray]) -> u32 {
         assert!(rays.len() <= PACKET, "at most {PACKET} rays");
         if self.top.takes_lanes()
-            && let Some(blocked) = self.blocked_by_lane::<S>(rays)
+            && let Some(blocked) = self.blocked_by_lane::<S>(lanes, rays)
         {
             return blocked;
         }
