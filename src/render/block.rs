@@ -12,7 +12,7 @@ use super::{
     filter::{Layer, Layers, is_seen},
     found::{Maps, Spots},
     material::Coverage,
-    pattern::{Samplers, subpixel},
+    pattern::{CENTRE, Samplers, subpixel},
     plain::{self, PlainPoints},
     probe::{NO_RAY, Points, Probes},
     shade::LitPoints,
@@ -135,7 +135,8 @@ impl<F: Floats> Block<F> {
 
     #[cfg_attr(not(debug_assertions), inline(always))]
     fn camera_rays(&self, ctx: &FrameContext<'_>, sample: u32) -> CameraRays<F> {
-        let (jitter_x, jitter_y) = subpixel(sample);
+        let alone = sample == 0 && ctx.settings.samples == 1;
+        let (jitter_x, jitter_y) = if alone { CENTRE } else { subpixel(sample) };
         let (mut x, mut y) = ([0.0; LANES], [0.0; LANES]);
         for lane in 0..F::LEN {
             let (column, row) = self.pixel(lane);

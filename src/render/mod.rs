@@ -103,7 +103,7 @@ pub struct RenderSettings {
     pub samples: u32,
     /// Number of the first sample in a pixel's pattern, so that the mean of several renders continues the
     /// pattern: those of samples 0..4 and 4..8 are together the 8 samples of one. 0 for a picture in one go;
-    /// sample 0 is the pixel centre when `samples` is 1 and this is 0.
+    /// sample 0 is the pixel centre when it is the only one.
     pub first_sample: u32,
     /// Seed of the sample pattern.
     pub seed: u64,

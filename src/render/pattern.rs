@@ -34,12 +34,19 @@ fn r2(index: u32, start: [u32; 2]) -> (f32, f32) {
     (at(0), at(1))
 }
 
-/// Where within the pixel sample `index` falls, in `[0, 1)` squared. Sample 0 is the centre; all pixels share
-/// the pattern, whose prefixes of any length are evenly spread.
+/// Where within the pixel sample `index` falls, in `[0, 1)` squared. All pixels share the pattern, whose prefixes are evenly spread.
+///
+/// Samples come in pairs, each the other mirrored at the pixel's centre: the mean of an even number lies there, so that a picture of few samples
+/// is not shifted.
 #[inline(always)]
 pub(crate) fn subpixel(index: u32) -> (f32, f32) {
-    r2(index, [0x8000_0000; 2])
+    // Half a step from the centre, so that the two of a pair are a step apart.
+    let [x, y] = STEP.map(|step| (0x8000_0000 + step / 2).wrapping_add(step.wrapping_mul(index / 2)));
+    if index.is_multiple_of(2) { (unit(x), unit(y)) } else { (unit(x.wrapping_neg()), unit(y.wrapping_neg())) }
 }
+
+/// Where a single sample falls.
+pub(crate) const CENTRE: (f32, f32) = (0.5, 0.5);
 
 /// What decides the random numbers of one sample of one pixel.
 #[derive(Clone, Copy, Debug)]
@@ -95,8 +102,24 @@ mod tests {
     use super::*;
 
     #[test]
-    fn sample_zero_is_the_pixel_centre() {
-        assert_eq!(subpixel(0), (0.5, 0.5));
+    fn an_even_number_of_samples_lies_around_the_pixel_centre() {
+        for pair in 0..500 {
+            let ((x, y), (u, v)) = (subpixel(2 * pair), subpixel(2 * pair + 1));
+            assert!((x + u - 1.0).abs() < 1e-6 && (y + v - 1.0).abs() < 1e-6, "{pair}: {x} {y}, {u} {v}");
+        }
+    }
+
+    /// No two of four, or of eight, share a row or a column of as many.
+    #[test]
+    fn few_samples_fall_into_all_rows_and_columns() {
+        for (count, all) in [(4, 0xf), (8, 0xff)] {
+            let mut lines = [0; 2];
+            for (x, y) in (0..count).map(subpixel) {
+                lines[0] |= 1 << (x * count as f32) as u32;
+                lines[1] |= 1 << (y * count as f32) as u32;
+            }
+            assert_eq!(lines, [all; 2]);
+        }
     }
 
     #[test]

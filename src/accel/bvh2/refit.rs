@@ -5,6 +5,7 @@ use crate::{
         sah,
     },
     geom::{Aabb, Triangles},
+    simd::{Simd, SimdLevel, Task, dispatch},
 };
 
 /// Subtrees of fewer pairs are refitted by one task.
@@ -40,27 +41,11 @@ pub(super) fn refit(pairs: &mut [Pair], blocks: &mut [TriBlock], prims: &Triangl
 
 impl Subtree<'_> {
     fn refit(self, prims: &Triangles<'_>) -> Swept {
-        if self.pairs.len() < TASK_PAIRS { self.sweep(prims) } else { self.fork(prims) }
-    }
-
-    /// Children have higher numbers than their parents, so one backward sweep meets them first.
-    fn sweep(self, prims: &Triangles<'_>) -> Swept {
-        let Self { pairs, blocks, first_pair, first_block } = self;
-        let mut swept = Swept::default();
-        for i in (0..pairs.len()).rev() {
-            let links = pairs[i].links;
-            for (child, link) in links.into_iter().enumerate() {
-                let (aabb, below) = if link.is_leaf() {
-                    refit_leaf(link, blocks, first_block, prims)
-                } else {
-                    let aabb = pairs[link.pair() - first_pair].union();
-                    (aabb, Swept { cost: sah::half_area(aabb) * sah::COST_TRAVERSE, own_area: 0.0 })
-                };
-                pairs[i].set_aabb(child, aabb);
-                swept = swept.plus(below);
-            }
+        if self.pairs.len() < TASK_PAIRS {
+            dispatch(SimdLevel::best(), Small { subtree: self, prims })
+        } else {
+            self.fork(prims)
         }
-        swept
     }
 
     fn fork(self, prims: &Triangles<'_>) -> Swept {
@@ -83,6 +68,37 @@ impl Subtree<'_> {
         root.set_aabb(0, box0);
         root.set_aabb(1, box1);
         swept0.plus(swept1)
+    }
+}
+
+/// A subtree that one task refits.
+struct Small<'a> {
+    subtree: Subtree<'a>,
+    prims: &'a Triangles<'a>,
+}
+
+impl Task for Small<'_> {
+    type Output = Swept;
+
+    /// Children have higher numbers than their parents, so one backward sweep meets them first.
+    #[inline(always)]
+    fn run<S: Simd>(self) -> Swept {
+        let Self { subtree: Subtree { pairs, blocks, first_pair, first_block }, prims } = self;
+        let mut swept = Swept::default();
+        for i in (0..pairs.len()).rev() {
+            let links = pairs[i].links;
+            for (child, link) in links.into_iter().enumerate() {
+                let (aabb, below) = if link.is_leaf() {
+                    refit_leaf(link, blocks, first_block, prims)
+                } else {
+                    let aabb = pairs[link.pair() - first_pair].union();
+                    (aabb, Swept { cost: sah::half_area(aabb) * sah::COST_TRAVERSE, own_area: 0.0 })
+                };
+                pairs[i].set_aabb(child, aabb);
+                swept = swept.plus(below);
+            }
+        }
+        swept
     }
 }
 

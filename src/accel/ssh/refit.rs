@@ -16,6 +16,7 @@ use crate::{
         sah,
     },
     geom::{Aabb, PrimId, Triangles},
+    simd::{Simd, SimdLevel, Task, dispatch},
 };
 
 /// Subtrees of fewer pairs are refitted by one task.
@@ -168,8 +169,8 @@ impl<L: Leaves, B: Store> Subtree<'_, L, B> {
     /// From the leaves upward; subtrees run in parallel in the current pool.
     pub(super) fn refit(mut self, prims: &Triangles<'_>) -> Swept {
         if self.pairs.len() < TASK_PAIRS {
-            let first = self.first;
-            return self.pair(first, prims);
+            let number = self.first;
+            return dispatch(SimdLevel::best(), Below { subtree: &mut self, number, prims });
         }
         let Self { pairs, first, leaves, store } = self;
         let Some((root, rest)) = pairs.split_first_mut() else { return Swept::EMPTY };
@@ -197,14 +198,31 @@ impl<L: Leaves, B: Store> Subtree<'_, L, B> {
     fn leaf(&mut self, word: Word, prims: &Triangles<'_>) -> Swept {
         if word.is_none() { Swept::EMPTY } else { self.leaves.refit(word.index(), prims) }
     }
+}
+
+/// A pair of a subtree and what is below it.
+struct Below<'a, 's, L, B> {
+    subtree: &'a mut Subtree<'s, L, B>,
+    number: usize,
+    prims: &'a Triangles<'a>,
+}
+
+impl<L: Leaves, B: Store> Task for Below<'_, '_, L, B> {
+    type Output = Swept;
 
     /// Depth first; the builder bounds the depth.
-    fn pair(&mut self, number: usize, prims: &Triangles<'_>) -> Swept {
+    #[inline(always)]
+    fn run<S: Simd>(self) -> Swept {
+        let Self { subtree, number, prims } = self;
         let mut both = Swept::EMPTY;
         for child in 0..2 {
-            let word = self.pairs[number - self.first].0[child].word;
-            let swept = if word.is_leaf() { self.leaf(word, prims) } else { self.pair(word.index(), prims) };
-            self.store.store(number, child, &swept.aabb, &mut self.pairs[number - self.first].0[child]);
+            let word = subtree.pairs[number - subtree.first].0[child].word;
+            let swept = if word.is_leaf() {
+                subtree.leaf(word, prims)
+            } else {
+                S::call(Below { subtree: &mut *subtree, number: word.index(), prims })
+            };
+            subtree.store.store(number, child, &swept.aabb, &mut subtree.pairs[number - subtree.first].0[child]);
             both = both.plus(swept);
         }
         both
