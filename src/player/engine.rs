@@ -234,9 +234,12 @@ impl Engine for TraceEngine {
         if restart {
             self.summed = 0;
         }
-        // A picture of one sample is soonest there; the others add to it.
+        // A picture of one sample is soonest there. That sample, the pixel's centre, is none of the pattern's.
         let count = if restart { 1 } else { PASS_SAMPLES.min(REFINED_SAMPLES - self.summed) };
         let Some(pass) = self.trace(shot, 1, (self.summed, count), stop)? else { return Ok(None) };
+        if restart {
+            return Ok(Some(self.picture(shot, pass, 1, count)));
+        }
         self.accumulate(count);
         Ok(Some(self.picture(shot, pass, 1, self.summed)))
     }
@@ -315,7 +318,7 @@ mod tests {
         assert_eq!((picture.samples, &picture.rgba), (1, &one), "the first is that of one sample");
         let folder = tempfile::tempdir().unwrap();
         while !picture.is_final {
-            if picture.samples == 31 {
+            if picture.samples == 32 {
                 let stopped = engine.refine(&shot, false, &AtomicBool::new(true)).unwrap();
                 assert!(stopped.is_none());
                 let still = StillJob { shot: shot.clone(), file: StillFile::Exact(folder.path().join("a.png")) };
