@@ -429,6 +429,19 @@ mod tests {
     }
 
     #[test]
+    fn between_levels_both_are_blended() {
+        let p = pyramid(64, 64);
+        let s = TexSampler { mip: Some(Filter::Linear), min: Filter::Nearest, ..TexSampler::default() };
+        for (level, part) in [(0, 0.25), (1, 0.5), (4, 0.75), (5, 0.125)] {
+            let width = libm::exp2f(level as f32 + part) / 64.0;
+            let f = Steps { dx: Vec2::new(width, 0.0), dy: Vec2::new(0.0, width) };
+            let (fine, coarse) = (p.texel(level, 0, 0), p.texel(level + 1, 0, 0));
+            let got = sample(&p, s, Vec2::splat(0.001), &f);
+            assert!((got - fine.lerp(coarse, part)).abs().max_element() < 1e-3, "level {level}: {got}");
+        }
+    }
+
+    #[test]
     fn a_stretched_footprint_keeps_detail_across_it() {
         let stripes = Pyramid::new(
             &image(64, 64, |x, _| if x % 16 < 8 { [255; 4] } else { [0, 0, 0, 255] }),
