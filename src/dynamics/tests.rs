@@ -9,7 +9,7 @@ use glam::{DAffine3, DVec3, Vec3};
 
 use super::{FrameConfig, FrameError, FrameLoop, RebuildPolicy, builder::Built, grouping::Grouping, pool::Pool};
 use crate::{
-    accel::PACKET,
+    accel::{LanePacket, PACKET},
     anim::ActiveClip,
     geom::{Forms, Hit, InstanceId, PrimId, Ray},
     scene::{ClipId, Scene},
@@ -83,14 +83,15 @@ impl Task for Together<'_> {
         let blocked_singly = rays.iter().map(|ray| world.is_blocked::<S>(ray)).collect();
         let (mut hits, mut blocked) = (Vec::new(), Vec::new());
         let left_over = Hit { t: 1.0, u: 0.0, v: 0.0, prim: PrimId(0), instance: InstanceId(0) };
+        let mut lanes = LanePacket::EMPTY;
         let (mut first, mut len) = (0, 1);
         while first < rays.len() {
             let end = rays.len().min(first + len);
             let mut found = [Some(left_over); PACKET];
-            world.nearest_hits::<S>(&rays[first..end], &mut found);
+            world.nearest_hits_with::<S>(&mut lanes, &rays[first..end], &mut found);
             assert!(found[end - first..].iter().all(Option::is_none), "hits without rays");
             hits.extend(&found[..end - first]);
-            let mask = world.blocked::<S>(&rays[first..end]);
+            let mask = world.blocked_with::<S>(&mut lanes, &rays[first..end]);
             blocked.extend((0..end - first).map(|i| (mask >> i) & 1 == 1));
             (first, len) = (end, len % PACKET + 1);
         }
