@@ -99,6 +99,26 @@ impl Task for Together<'_> {
     }
 }
 
+/// Full packets, each with storage of its own.
+struct Apart<'a>(&'a World, &'a [Ray]);
+
+impl Task for Apart<'_> {
+    type Output = (Vec<Option<Hit>>, Vec<bool>);
+
+    #[inline(always)]
+    fn run<S: Simd>(self) -> Self::Output {
+        let (mut hits, mut blocked) = (Vec::new(), Vec::new());
+        for rays in self.1.chunks(PACKET) {
+            let mut found = [None; PACKET];
+            self.0.nearest_hits::<S>(rays, &mut found);
+            hits.extend(&found[..rays.len()]);
+            let mask = self.0.blocked::<S>(rays);
+            blocked.extend((0..rays.len()).map(|i| (mask >> i) & 1 == 1));
+        }
+        (hits, blocked)
+    }
+}
+
 #[test]
 fn packets_answer_as_single_rays_do() {
     let ray = |i: u16| {
@@ -137,6 +157,7 @@ fn packets_answer_as_single_rays_do() {
             assert!(singly.iter().flatten().count() > 20, "rays must hit something");
             assert!(together == singly, "{accel} at {level}");
             assert!(blocked == blocked_singly, "{accel} at {level}");
+            assert!(dispatch(level, Apart(&world, &rays)) == (singly, blocked_singly), "{accel} at {level}");
         }
     }
 }
