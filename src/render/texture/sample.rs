@@ -175,9 +175,7 @@ impl<F: Floats> Chosen<F> {
         }
         out
     }
-}
 
-impl<F: Floats> Chosen<F> {
     /// The texels of the lanes of `mask` in these rows and columns.
     #[cfg_attr(not(debug_assertions), inline(always))]
     fn texels(&self, pyramid: &Pyramid, mask: u32, rows: &[u32; LANES], columns: &[u32; LANES]) -> [F; 4] {

@@ -9,8 +9,8 @@ use crate::{
     report::{Monitor, ReportError, measure::Samples},
 };
 
-/// Times that the rays of a frame are cast; the median counts. All together are still fewer than those of a picture of 1280x720, so that a background
-/// builder has less time for a frame than it has when frames are shown.
+/// Times that the rays of a frame are cast; the median counts. It is by all of them that a background builder has time for a frame: on large scenes about as long
+/// as a picture of 1280x720 takes two threads, which leave it no core of its own as this one does.
 const RUNS: usize = 5;
 
 /// No more than three times are begun after so long: trees that decayed would take minutes.

@@ -154,7 +154,8 @@ pub(super) fn summary(plays: &[Played]) -> Table {
     let mut table = Table::new("summary", "Policies", SUMMARY).with_note(
         "Medians over the frames unless a column says otherwise. Rays are those of a picture, with a shadow and a bounce for each hit; trace is the processor time \
          of one thread that casts them. The other stages, and made, which is all of them, are wall-clock times in the pool while the background builder has its \
-         own thread. A frame's rays are cast several times and the median counts; trace / rebuilt divides it by that of the frame under `rebuild`. Quality is the surface-area cost over that of the last build; age counts the frames since the vertices that a tree was built from.",
+         own thread. A frame's rays are cast several times, which is the time that the builder has for it, and the median counts; \
+         trace / rebuilt divides it by that of the frame under `rebuild`. Quality is the surface-area cost over that of the last build; age counts the frames since the vertices that a tree was built from.",
     );
     for play in plays {
         play.runs.iter().for_each(|run| table.push(play.cells(run)));
